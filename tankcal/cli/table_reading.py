@@ -213,7 +213,7 @@ def _head(found):
 def _zero(found):
     if found.zero_m.u == 0:
         return message("read_zero_held", "zero: the bottom of the first course")
-    if found.zero_m.u > 0.05:
+    if not found.zero_m.u <= 0.05:
         return message("read_zero_unknown", "zero: cannot be told from this table")
     zero, u = _with_u(1000 * found.zero_m.value, 1000 * found.zero_m.u)
     return message(

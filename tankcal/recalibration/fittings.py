@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SAME_SLOPE = 0.03
+SAME_SLOPE = 0.03  # of the largest, that is none
+ROUNDING = 1e-11  # of a ramp, that is left when the adjustment takes it up
 GIVING = 0.5  # what gives room is rarer, and looks like the gap between two things that take it
 APART = 3  # places, of candidates
 MOST_PLACES = 300  # of kinks that are tried; a finer table is tried at some of its rows
@@ -82,7 +83,7 @@ def find_fittings(dips_m, left_m3, design, sd_m3, longest_m=np.inf, most=4):
     reach = np.maximum(np.einsum("np,np->p", ramps, ramps), 1e-300)
     gram, of_left = left.T @ left, left.T @ (left_m3 / sd_m3)
     apart = np.diag(gram)[:, None] + np.diag(gram) - 2 * gram
-    is_told = apart > 1e-9 * np.minimum(reach[:, None], reach)
+    is_told = apart > ROUNDING * np.maximum(reach[:, None], reach)
     height = places - places[:, None]
     is_told &= (height > 0) & (height <= longest_m)
     along = of_left[:, None] - of_left

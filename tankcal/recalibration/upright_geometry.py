@@ -16,9 +16,10 @@ from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.recalibration.fittings import find_fittings, in_other_pairs
 from tankcal.recalibration.table_fit import State, fit, held_kinks
-from tankcal.recalibration.zero import FARTHEST_M, find_zeros
+from tankcal.recalibration.zero import FARTHEST_M, find_zeros, move_seams
 
 STEEL_PA = 206e9
+SEAMS_FREE = "base", "density", "seams"
 LEAST_GAIN = 25.0  # of chi2 by a thing: less is what the best of all pairs gains by chance
 MOST_FITTINGS, FEW_FITTINGS = 12, 4
 SAME_COST = 1.0
@@ -78,7 +79,8 @@ class UprightGeometry:
     heights_m, thickness_m : ndarray, shape (n,)
         Of the rings that the table reaches.
     zero_m : Reading
-        Dip of the bottom of the first ring.
+        Dip of the bottom of the first ring; u is 0 where the table is empty at its zero and begins
+        there, nan where that cannot be told because the seams are found, too.
     seams_m : tuple of Reading
         Dips of the seams, each looked for by itself; u is large where nothing jumps there.
     seams_are : {"declared", "found"}
@@ -254,9 +256,10 @@ def _start(rows, heights, plates, modulus, zone):
 def _search(rows, state, lowest_m):
     """The Fit of all that is found in the rows."""
     if lowest_m is not None:
-        return _with_fittings(rows.above(lowest_m), state)
+        rows = rows.above(lowest_m)
+        return _with_moved_seams(rows, _with_fittings(rows, state))
     lowest = _lowest_row(rows, state)
-    found = _with_fittings(rows.above(lowest), state)
+    found = _with_moved_seams(rows.above(lowest), _with_fittings(rows.above(lowest), state))
     if lowest > rows.dip_m[0]:
         more = replace(found.state, lowest_m=float(rows.dip_m[0]))
         try:
@@ -266,6 +269,22 @@ def _search(rows, state, lowest_m):
         if _is_by_rounding(whole) and _is_enough(rows, found, whole):
             return whole
     return found
+
+
+def _with_moved_seams(rows, found):
+    """The Fit with seams where the rows show them, if that spares things that look like seams."""
+    if _is_plain(found) or not len(found.state.seams_m):
+        return found
+    zero = found.state.zero_m
+    edges = found.state.rings.edges_m[1:-1]
+    moved = move_seams(rows.dip_m, rows.volume_m3, rows.sd_m3, edges) - zero
+    if np.any(np.diff(moved) <= 0):
+        return found
+    state = replace(found.state, seams_m=moved, fittings=(), free=frozenset(SEAMS_FREE))
+    other = _from_zero(rows.above(zero + NEAR_M), state, MOST_FITTINGS)
+    price = LEAST_GAIN * len(moved) / 2
+    is_better = other is not None and _cost(other) + price < _cost(found)
+    return _with_lower_rows(rows, other) if is_better else found
 
 
 def _is_enough(rows, found, whole):
@@ -332,17 +351,23 @@ def _with_fittings(rows, state, at_most=MOST_FITTINGS):
     many, or do not explain the rows.
     """
     zeros = find_zeros(rows.dip_m, rows.volume_m3, rows.sd_m3, state.seams_m)
-    best = None
+    best, tried = None, 0
     for zero in (state.zero_m,) if state.fittings else (*zeros, *USUAL_ZEROS_M):
         other = _from_zero(rows.above(zero + NEAR_M), replace(state, zero_m=zero), at_most)
         if other and (best is None or _cost(other) < _cost(best) - SAME_COST):
             best = other
         if best and _is_plain(best) and _is_by_rounding(best):
             break
+        tried += other is None or len(other.state.fittings) >= at_most
+        if tried > 1:
+            break
     if best is None:
         raise SolutionError(
             message("former_undetermined", "the rows of the table do not determine the radii")
         )
+    if len(best.state.fittings) > FEW_FITTINGS and not _is_by_rounding(best):
+        bare = replace(best.state, fittings=())  # things without end explain what is not their own
+        best = _with_free_zero(rows.above(best.state.lowest_m), bare, bare.zero_m) or best
     return _with_lower_rows(rows, best)
 
 
@@ -458,7 +483,7 @@ def _with_free_zero(rows, state, about):
     Where that fails, the zero is held, or things where they were looked for; None: all fails.
     """
     things = {"kinks"} if state.fittings else set()
-    zero = {"zero"} if len(state.seams_m) else set()
+    zero = {"zero"} if len(state.seams_m) and "seams" not in state.free else set()
     held = state.free - {"zero", "kinks"}
     for free in dict.fromkeys(
         map(frozenset, (held | things | zero, held | things, held | zero, held))
@@ -482,10 +507,10 @@ def _geometry(former, found, rows, used, seams_known):
     chosen = rows._of(used)
     found = _with_sure_fittings(chosen, _with_known_zero(chosen, former, found))
     found, other = _with_order(chosen, found)
-    seams = _free_seams(chosen, found)
-    seams_are = "declared"
+    seams = found if "seams" in found.state.free else _free_seams(chosen, found)
     if seams is not None and (not seams_known or _are_elsewhere(found, seams)):
-        found, seams_are = seams, "found"
+        found = seams
+    seams_are = "found" if "seams" in found.state.free else "declared"
     roughness = _roughness(chosen, found)
     u_density = float(np.hypot(found.sd("density")[0] * roughness, _by_order(found, other)[0]))
     t = found.state.density_kg_m3 / u_density
@@ -617,9 +642,7 @@ def _as_geometry(former, found, rows, used, *, roughness, density, head, t, with
         covariance_m2=covariance,
         heights_m=np.diff(edges),
         thickness_m=state.thickness_m,
-        zero_m=Reading(state.zero_m, *sd["zero"])
-        if len(sd["zero"])
-        else Reading(state.zero_m, 0.0),
+        zero_m=_zero_reading(state, sd["zero"]),
         seams_m=_seam_readings(state if seams is None else seams.state, seams, roughness),
         seams_are=seams_are,
         density_kg_m3=density,
@@ -638,6 +661,13 @@ def _as_geometry(former, found, rows, used, *, roughness, density, head, t, with
         roughness=roughness,
         state=state,
     )
+
+
+def _zero_reading(state, sds):
+    """Zero, with u 0 where the table is empty at its zero, nan where seams are not known."""
+    if len(sds):
+        return Reading(state.zero_m, float(sds[0]))
+    return Reading(state.zero_m, np.nan if "base" in state.free else 0.0)
 
 
 def _seam_readings(state, seams, roughness):

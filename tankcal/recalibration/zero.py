@@ -8,6 +8,7 @@ thing in the tank near one seam must not decide for all.
 import numpy as np
 
 FARTHEST_M, STEP_M = 0.35, 0.01
+MOVED_M = 0.15  # that a seam is looked for from where it was declared
 WINDOW_M = 0.5  # of rows about a seam, beyond the farthest zero
 LARGEST_VOTE = 25.0  # of chi2
 FEWEST_ROWS = 7  # of a window
@@ -43,6 +44,21 @@ def find_zeros(dips_m, volumes_m3, sd_m3, seams_m, most=3):
         if len(found) == most:
             break
     return tuple(found)
+
+
+def move_seams(dips_m, volumes_m3, sd_m3, seams_m):
+    """(n,) dips of seams, each where the rows about it show a kink by themselves.
+
+    Parameters
+    ----------
+    dips_m, volumes_m3, sd_m3 : (rows,) ndarray
+    seams_m : (n,) ndarray
+        Dips that they were declared to be at.
+    """
+    shifts = np.arange(-round(MOVED_M / STEP_M), round(MOVED_M / STEP_M) + 1) * STEP_M
+    shifts = shifts[np.argsort(np.abs(shifts), kind="stable")]
+    votes = [_vote(dips_m, volumes_m3, sd_m3, seam + shifts) for seam in seams_m]
+    return np.array([s + shifts[np.argmin(v)] for s, v in zip(seams_m, votes, strict=True)])
 
 
 def _vote(dips, volumes, sds, seams):
