@@ -69,10 +69,10 @@ def table_of(tank, step_m=0.01, quantum_m3=0.001, first_m=0.0, last_m=None, **de
 
 
 def draw_tank(random, *, density=None, shift=True, deadwood=True, bottom=True):
-    """A tank of 3 to 9 rings, 8 to 40 m wide, as it is drawn by `random`."""
+    """A tank of 3 to 9 rings, 12 to 40 m wide, as it is drawn by `random`."""
     count = int(random.integers(3, 10))
     heights = np.round(random.uniform(1.2, 2.5, count), 3)
-    radius = random.uniform(4.0, 20.0)
+    radius = random.uniform(6.0, 20.0)
     depth = np.cumsum(heights[::-1])[::-1]
     plates = np.ceil(2 * np.maximum(1000 * depth * 8 * radius / 150e3, 2.5)) / 2 / 1000
     plates = np.maximum(plates, 0.005)

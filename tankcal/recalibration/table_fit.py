@@ -15,7 +15,7 @@ from tankcal.recalibration.upright_shell import Rings
 
 ZERO_SD_M, SEAM_SD_M, KINK_SD_M = 0.1, 0.05, 1.0  # so weak that a table decides; never singular
 DENSITY_SD_KG_M3 = 1e5
-MOST_ROUNDS, MOST_HALVINGS, SETTLED = 30, 12, 1e-4  # of chi2
+MOST_ROUNDS, MOST_HALVINGS, SETTLED = 15, 6, 1e-3  # of chi2
 
 
 @dataclass(frozen=True)

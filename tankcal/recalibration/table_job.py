@@ -9,6 +9,7 @@ import numpy as np
 from tankcal.recalibration.solid_geometry import declared_sizes, declared_uncertainties
 
 USUAL_TEMPERATURE_C = 20.0
+UNKNOWN_ZERO_M = 0.02
 SURE = 3.0  # standard uncertainties, within which a bottom is flat and a zero is at the bottom
 
 
@@ -46,8 +47,7 @@ def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
     tank_id : str
     """
     density = 0.0 if found.head == "without" else found.state.density_kg_m3
-    zero = 0.0 if abs(found.zero_m.value) < 5e-5 else found.zero_m.value
-    bottom = _bottom_rows(former, found)
+    zero, bottom = _bottom(former, found)
     settings = _settings(
         former,
         tank_id=tank_id,
@@ -152,7 +152,7 @@ def _settings(former, *, tank_id, diameter, height, zero, density, source, u_com
         f"date = {_day(former)}",
         "",
         "[datum]",
-        f"bottom_z_m = {zero:.5f}",
+        f"bottom_z_m = {zero:.7f}",
         "dip_plate_z_m = 0.0",
         *(
             [f"reference_height_m = {former.reference_height_m:.4f}"]
@@ -221,20 +221,32 @@ def _csv(heading, rows, decimals):
     return "\n".join(lines) + "\n"
 
 
-def _bottom_rows(former, found):
-    """(rows, 2) dips and volumes up to the lowest row that was used; None: the bottom is flat."""
-    base, lowest, zero = found.base_m3, found.lowest_m, found.zero_m
-    state = found.state
+def _bottom(former, found):
+    """Dip of the bottom of the first ring, and what lies below the lowest row that was used.
+
+    The bottom is flat where the zero may be so placed that it explains every row: then it is there,
+    and the second is None. Else they are (rows, 2) dips and volumes up to that row.
+    """
+    base, lowest, zero, state = found.base_m3, found.lowest_m, found.zero_m, found.state
     shell = state.rings.volume_m3(np.array([lowest]), state.radii_m, state.density_kg_m3)[0]
     area = np.pi * state.radii_m[0] ** 2
-    u = SURE * np.hypot(base.u + found.expected_m3, area * zero.u)
+    level = zero.value + (shell - base.value) / area
     below = former.height_m < lowest - 1e-9
-    dry = former.volume_m3[below] <= 0
-    if abs(base.value - shell) <= u and np.all(dry | (former.height_m[below] < zero.value)):
-        return None
-    rows = [*zip(former.height_m[below], former.volume_m3[below], strict=True)]
-    rows.append((lowest, base.value))
+    dips, volumes = former.height_m[below], former.volume_m3[below]
+    flat = area * np.maximum(dips - level, 0.0)
+    u = zero.u if np.isfinite(zero.u) else UNKNOWN_ZERO_M
+    is_near = abs(level - zero.value) <= SURE * (u + found.expected_m3 / area)
+    if is_near and np.all(np.abs(volumes - flat) < SURE * found.expected_m3):
+        return level, None
+    rows = [*zip(dips, volumes, strict=True), (lowest, base.value)]
+    if rows[0][0] > zero.value or len(rows) == 1:
+        rows.insert(0, _at_bottom(rows, zero.value, base.value - shell))
+    return zero.value, np.array(rows)
+
+
+def _at_bottom(rows, zero, below_shell):
+    """(dip, volume) of the bottom of the first ring, that rows begin above."""
     if len(rows) == 1:
-        start = max(base.value - shell, 0.0)
-        rows.insert(0, (min(zero.value, lowest - 0.001), start))
-    return np.array(rows)
+        return min(zero, rows[0][0] - 0.001), max(below_shell, 0.0)
+    (low, first), (high, second) = rows[:2]
+    return zero, max(first - (second - first) / (high - low) * (low - zero), 0.0)

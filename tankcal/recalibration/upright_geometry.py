@@ -352,7 +352,7 @@ def _with_fittings(rows, state, at_most=MOST_FITTINGS):
     """
     zeros = find_zeros(rows.dip_m, rows.volume_m3, rows.sd_m3, state.seams_m)
     best, tried = None, 0
-    for zero in (state.zero_m,) if state.fittings else (*zeros, *USUAL_ZEROS_M):
+    for zero in (state.zero_m,) if state.fittings else (zeros[0], *USUAL_ZEROS_M, *zeros[1:]):
         other = _from_zero(rows.above(zero + NEAR_M), replace(state, zero_m=zero), at_most)
         if other and (best is None or _cost(other) < _cost(best) - SAME_COST):
             best = other

@@ -107,6 +107,7 @@ def test_undecided_head_of_a_coarse_table():
     assert found.u_m.max() > 1e-3
 
 
+@pytest.mark.slow
 def test_zero_deadwood_and_bottom_together():
     """Simulation by numerical integration; the truth is met within 3 u."""
     things = ((2.3, 2.9, -0.15), (4.4, 4.7, -0.08))
@@ -132,6 +133,7 @@ def test_roof_is_read_above_its_zone():
     assert_allclose(found.radii_m, tank.radii_m, rtol=0, atol=5e-5)
 
 
+@pytest.mark.slow
 def test_seams_elsewhere_than_declared_are_found():
     tank = steps(density_kg_m3=800.0)
     wrong = tank.heights_m + np.array([0.0, 0.03, -0.03])
@@ -154,6 +156,7 @@ def test_zero_by_its_seams():
     assert min(abs(zero - 0.05) for zero in zeros) < 0.011
 
 
+@pytest.mark.slow
 def test_rows_rougher_than_their_rounding_are_told():
     """Increments rounded one by one and summed: errors pile up, u grows, the reading says so."""
     tank = steps(density_kg_m3=800.0)
