@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SAME_SLOPE = 0.03  # of the largest, that is none
 ROUNDING = 1e-11  # of a ramp, that is left when the adjustment takes it up
 GIVING = 0.5  # what gives room is rarer, and looks like the gap between two things that take it
 APART = 3  # places, of candidates
@@ -118,10 +117,11 @@ def _standing(gain, low, high, slope):
     return low, high
 
 
-def in_other_pairs(fittings, near_m):
+def in_other_pairs(fittings, near_m, least_share):
     """The same kinks as other things: one above the other where they overlapped.
 
-    Kinks nearer than `near_m` are one; those whose changes of slope cancel are none.
+    Kinks nearer than `near_m` are one; those of less than a share of the largest change of slope
+    are none.
     """
     kinks = []
     for one in fittings:
@@ -134,7 +134,7 @@ def in_other_pairs(fittings, near_m):
             joined[-1] = (joined[-1][0], joined[-1][1] + slope)
         else:
             joined.append((dip, slope))
-    real = [(dip, slope) for dip, slope in joined if abs(slope) > SAME_SLOPE * largest]
+    real = [(dip, slope) for dip, slope in joined if abs(slope) > least_share * largest]
     pairs = zip(real[::2], real[1::2], strict=False)
     return tuple(
         Fitting(low, high, (slope - other) / 2 * (high - low))

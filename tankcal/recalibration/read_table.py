@@ -10,10 +10,11 @@ from tankcal.messages import message
 from tankcal.recalibration.read_courses import read_courses
 from tankcal.recalibration.reading import read_former
 from tankcal.recalibration.recorded_radii import read_recorded
+from tankcal.recalibration.rounding import sd_of_rows
 from tankcal.recalibration.seams import find_seams
 from tankcal.recalibration.solid_geometry import fit_lying, fit_sphere
 from tankcal.recalibration.table_job import job_of_geometry, job_of_record, job_of_solid
-from tankcal.recalibration.upright_geometry import STEEL_PA, read_upright, sd_of_rows
+from tankcal.recalibration.upright_geometry import STEEL_PA, read_upright
 
 FEWEST_ROWS = 8
 SOLIDS = "horizontal", "sphere"

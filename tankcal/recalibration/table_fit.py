@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.adjust import adjust
+from tankcal.errors import SolutionError
 from tankcal.recalibration.fittings import Fitting
 from tankcal.recalibration.upright_shell import Rings
 
@@ -275,3 +276,40 @@ def held_kinks(state, fitting):
     if "kinks" not in state.free:
         return True, True
     return fitting.bottom_m <= state.lowest_m, fitting.top_m >= state.highest_m
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of a table.
+
+    Attributes
+    ----------
+    dip_m, volume_m3, sd_m3 : (rows,) ndarray
+        sd_m3: by rounding.
+    """
+
+    dip_m: np.ndarray
+    volume_m3: np.ndarray
+    sd_m3: np.ndarray
+
+    def above(self, dip_m):
+        """Those from a dip on."""
+        return self.of(self.dip_m >= dip_m - 1e-9)
+
+    def of(self, mask):
+        """Those of a mask."""
+        return Rows(self.dip_m[mask], self.volume_m3[mask], self.sd_m3[mask])
+
+    def adjust(self, state):
+        """The Fit of a State to them."""
+        lowest, highest = float(self.dip_m[0]), float(self.dip_m[-1])
+        state = replace(state, lowest_m=lowest, highest_m=highest)
+        return fit(state, self.dip_m, self.volume_m3, self.sd_m3)
+
+
+def tried(rows, state):
+    """The Fit of a State to Rows, or None where they do not determine it."""
+    try:
+        return rows.adjust(state)
+    except SolutionError:
+        return None

@@ -14,31 +14,18 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.recalibration.fittings import find_fittings, in_other_pairs
-from tankcal.recalibration.table_fit import State, fit, held_kinks
-from tankcal.recalibration.zero import FARTHEST_M, find_zeros, move_seams
+from tankcal.recalibration.rounding import roughness, scale_of_u, sd_of_rows
+from tankcal.recalibration.table_fit import Rows, State, held_kinks, tried
+from tankcal.recalibration.upright_search import LEAST_GAIN, SAME_ZERO, search, with_sure_fittings
 
 STEEL_PA = 206e9
-SEAMS_FREE = "base", "density", "seams"
-LEAST_GAIN = 25.0  # of chi2 by a thing: less is what the best of all pairs gains by chance
-MOST_FITTINGS, FEW_FITTINGS = 12, 4
-SAME_COST = 1.0
-LENGTHS_M = 1.0, 3.0, np.inf  # of things, in the order in which they are looked for
 START_DENSITY_KG_M3 = 500.0
 USUAL_KG_M3 = 450.0, 450.0  # of a head that a table cannot tell: about this, with this sd
 DECLARED_SD_KG_M3 = 10.0
 LIQUID_KG_M3 = 500.0  # a head that a table could not have shown of any liquid is undecided
-ROUGH = 1.15  # rms over what rounding leaves: above it, rows have more in them than rounding
-USUAL_ZEROS_M = 0.0, -0.04, 0.04  # that are tried, too, where things are many
-NEAR_M = 0.025  # that the zero may go from where it was looked for
 FEWEST_ROWS = 3  # of a ring
-SAME_ZERO = 3.0  # standard deviations
 BY_ORDER = 1.0  # of chi2, by which the head of second order has to fit better
 ORDER_IS_CLEAR = 9.0
-CUT_M, CUT_ROWS = 0.4, 9  # of the rows that have to be of one cut, so that the bottom is below
-BOTTOM_TRIES = 60
-LOW_M, LOW_SHARE = 0.15, 0.2  # things lower than this take no more of the cut: that is the bottom
-EDGE_M = 0.1  # below the first seam: where rows of the first ring end, the zero being unknown
 
 
 @dataclass(frozen=True)
@@ -106,6 +93,9 @@ class UprightGeometry:
         What u was multiplied by because rows have more in them than rounding; 1: nothing.
     state : State
         All of it, as a function of the dip.
+    independent_u : (float, ndarray)
+        Standard deviations of density and (n,) radii if each row were rounded independently of the
+        others; u is never less (`rounding`).
     """
 
     name: str
@@ -132,26 +122,7 @@ class UprightGeometry:
     without_head: tuple[float, float, np.ndarray] | None
     roughness: float
     state: State
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """The rows of a table that are used."""
-
-    dip_m: np.ndarray
-    volume_m3: np.ndarray
-    sd_m3: np.ndarray
-
-    def above(self, dip_m):
-        return self._of(self.dip_m >= dip_m - 1e-9)
-
-    def _of(self, mask):
-        return _Rows(self.dip_m[mask], self.volume_m3[mask], self.sd_m3[mask])
-
-    def adjust(self, state):
-        lowest, highest = float(self.dip_m[0]), float(self.dip_m[-1])
-        state = replace(state, lowest_m=lowest, highest_m=highest)
-        return fit(state, self.dip_m, self.volume_m3, self.sd_m3)
+    independent_u: tuple[float, np.ndarray]
 
 
 def read_upright(
@@ -190,7 +161,7 @@ def read_upright(
     """
     heights, plates = np.asarray(heights_m, float), np.asarray(thickness_m, float)
     volume = former.volume_m3 - sum((one.volume_below_m3(former.height_m) for one in known), 0.0)
-    rows = _Rows(former.height_m, volume, sd_of_rows(former))
+    rows = Rows(former.height_m, volume, sd_of_rows(former))
     zone = former.roof.critical_m if former.roof else None
     used = np.ones(len(volume), dtype=bool)
     if zone is not None:
@@ -198,24 +169,11 @@ def read_upright(
     empty = rows.volume_m3 <= 0
     if np.count_nonzero(empty) > 1:  # dips below the bottom
         used &= ~empty
-    usable = rows._of(used)
+    usable = rows.of(used)
     state = _start(usable, heights, plates, modulus_pa, zone)
-    found = _search(usable, state, lowest_m)
+    found = search(usable, state, lowest_m)
     used &= rows.dip_m >= found.state.lowest_m - 1e-9
     return _geometry(former, found, rows, used, seams_known)
-
-
-def sd_of_rows(former):
-    """(rows,) standard deviations of a table's volumes by its last digits.
-
-    Dips of an even step are what the table was made for; others were rounded, too.
-    """
-    dips, volumes = former.height_m, former.volume_m3
-    finest = 1e-7 + 1e-12 * float(np.abs(volumes).max())
-    own = max(former.volume_quantum_m3, finest) / np.sqrt(12)
-    if former.height_rounding_m is None:
-        return np.full(len(dips), own)
-    return np.hypot(own, np.gradient(volumes, dips) * former.height_rounding_m / np.sqrt(3))
 
 
 def _start(rows, heights, plates, modulus, zone):
@@ -253,281 +211,46 @@ def _start(rows, heights, plates, modulus, zone):
     )
 
 
-def _search(rows, state, lowest_m):
-    """The Fit of all that is found in the rows."""
-    if lowest_m is not None:
-        rows = rows.above(lowest_m)
-        return _with_moved_seams(rows, _with_fittings(rows, state))
-    lowest = _lowest_row(rows, state)
-    found = _with_moved_seams(rows.above(lowest), _with_fittings(rows.above(lowest), state))
-    if lowest > rows.dip_m[0]:
-        more = replace(found.state, lowest_m=float(rows.dip_m[0]))
-        try:
-            whole = _with_fittings(rows, more, at_most=len(found.state.fittings) + 1)
-        except SolutionError:
-            return found
-        if _is_by_rounding(whole) and _is_enough(rows, found, whole):
-            return whole
-    return found
-
-
-def _with_moved_seams(rows, found):
-    """The Fit with seams where the rows show them, if that spares things that look like seams."""
-    if _is_plain(found) or not len(found.state.seams_m):
-        return found
-    zero = found.state.zero_m
-    edges = found.state.rings.edges_m[1:-1]
-    moved = move_seams(rows.dip_m, rows.volume_m3, rows.sd_m3, edges) - zero
-    if np.any(np.diff(moved) <= 0):
-        return found
-    state = replace(found.state, seams_m=moved, fittings=(), free=frozenset(SEAMS_FREE))
-    other = _from_zero(rows.above(zero + NEAR_M), state, MOST_FITTINGS)
-    price = LEAST_GAIN * len(moved) / 2
-    is_better = other is not None and _cost(other) + price < _cost(found)
-    return _with_lower_rows(rows, other) if is_better else found
-
-
-def _is_enough(rows, found, whole):
-    """Whether rows far more than their new unknowns are explained by these."""
-    return len(rows.dip_m) - len(found.left_m3) > 10 * (
-        len(whole.state.unknowns) - len(found.state.unknowns)
-    )
-
-
-def _is_by_rounding(found):
-    """Whether nothing is left but rounding: as a whole, and at the worst row."""
-    worst = np.abs(found.left_m3 / found.sd_m3).max()
-    return found.chi2 < ROUGH**2 * max(found.dof, 1) and worst < np.sqrt(3) * 1.25
-
-
-def _lowest_row(rows, state):
-    """Dip from which on rows are those of one cut: above the highest point of the bottom.
-
-    The lowest row of the first ring above which a parabola leaves nothing but rounding.
-    """
-    first = rows.dip_m <= state.seams_m[0] - EDGE_M if len(state.seams_m) else rows.dip_m >= 0
-    ring = rows._of(first)
-    length = max(CUT_M, CUT_ROWS * float(np.median(np.diff(rows.dip_m))))
-    tries = np.flatnonzero(ring.dip_m <= ring.dip_m[-1] - length) if len(ring.dip_m) else ()
-    if len(tries) == 0:
-        return float(rows.dip_m[0])
-    for place in [int(tries[0]), *_halving(tries)]:
-        dip = ring.dip_m[place]
-        window = ring._of((ring.dip_m >= dip) & (ring.dip_m <= dip + length + 1e-9))
-        if _is_one_cut(window):
-            return float(dip)
-    return float(rows.dip_m[0])
-
-
-def _halving(tries):
-    """At most BOTTOM_TRIES of the rows, rising; closer together at the bottom."""
-    last = len(tries) - 1
-    places = np.round(last * np.linspace(0, 1, BOTTOM_TRIES) ** 1.5).astype(int)
-    return tries[np.unique(places)]
-
-
-def _is_one_cut(ring):
-    """Whether a parabola leaves no more than rounding of rows."""
-    if len(ring.dip_m) < 5:
-        return False
-    x = (ring.dip_m - ring.dip_m[0]) / (ring.dip_m[-1] - ring.dip_m[0])
-    basis = np.vander(x, 3) / ring.sd_m3[:, None]
-    value = (ring.volume_m3 - ring.volume_m3[0]) / ring.sd_m3
-    left = value - basis @ np.linalg.lstsq(basis, value, rcond=None)[0]
-    dof = len(x) - 3
-    is_rounding = np.abs(left).max() < np.sqrt(3) * 1.25
-    lower = left[: max(len(left) // 4, 2)]  # a bottom shows here first
-    return (
-        is_rounding
-        and left @ left < dof + 4 * np.sqrt(dof)
-        and abs(lower.sum()) < 4 * np.sqrt(len(lower))
-    )
-
-
-def _with_fittings(rows, state, at_most=MOST_FITTINGS):
-    """The Fit with the things that the rows show, from the zero that needs the fewest of them.
-
-    A zero that is far off lets seams look like things, so that others are tried where things are
-    many, or do not explain the rows.
-    """
-    zeros = find_zeros(rows.dip_m, rows.volume_m3, rows.sd_m3, state.seams_m)
-    best, tried = None, 0
-    for zero in (state.zero_m,) if state.fittings else (zeros[0], *USUAL_ZEROS_M, *zeros[1:]):
-        other = _from_zero(rows.above(zero + NEAR_M), replace(state, zero_m=zero), at_most)
-        if other and (best is None or _cost(other) < _cost(best) - SAME_COST):
-            best = other
-        if best and _is_plain(best) and _is_by_rounding(best):
-            break
-        tried += other is None or len(other.state.fittings) >= at_most
-        if tried > 1:
-            break
-    if best is None:
-        raise SolutionError(
-            message("former_undetermined", "the rows of the table do not determine the radii")
-        )
-    if len(best.state.fittings) > FEW_FITTINGS and not _is_by_rounding(best):
-        bare = replace(best.state, fittings=())  # things without end explain what is not their own
-        best = _with_free_zero(rows.above(best.state.lowest_m), bare, bare.zero_m) or best
-    return _with_lower_rows(rows, best)
-
-
-def _with_lower_rows(rows, found):
-    """The Fit with rows that were left out because the first ring might have begun among them."""
-    more = len(rows.dip_m) - len(found.left_m3)
-    for lowest in rows.dip_m[:more]:
-        chosen = rows.above(lowest)
-        again = _tried(chosen, replace(found.state, base_m3=float(chosen.volume_m3[0])))
-        if again and _is_possible(again):
-            gain = again.chi2 - found.chi2
-            if gain < len(chosen.dip_m) - len(found.left_m3) + SAME_ZERO**2:
-                return again
-    return found
-
-
-def _is_plain(found):
-    """Whether its things are few, and none of them what seams look like from a wrong zero."""
-    seams = found.state.rings.edges_m[1:-1]
-    return len(found.state.fittings) <= FEW_FITTINGS and all(
-        one.volume_m3 < 0
-        and one.top_m - one.bottom_m < LENGTHS_M[0]
-        and not np.any(np.abs(seams - one.bottom_m) < NEAR_M)
-        and not np.any(np.abs(seams - one.top_m) < NEAR_M)
-        for one in found.state.fittings
-    )
-
-
-def _cost(found):
-    return found.chi2 + LEAST_GAIN * len(found.state.fittings)
-
-
-def _from_zero(rows, start, at_most):
-    """The Fit with things, the zero free about where it starts; None where rows do not do.
-
-    Short things first: two kinks of two things, one above the other, look like one thing.
-    """
-    about = start.zero_m
-    found = _with_free_zero(rows, start, about)
-    for longest in LENGTHS_M if found else ():
-        while len(found.state.fittings) < at_most and found.dof > 6:
-            again = _with_one_more(rows, found, longest, about)
-            if again is None:
-                break
-            found = again
-    return _tidied(rows, found, about) if found else None
-
-
-def _with_one_more(rows, found, longest, about):
-    """The Fit with the thing that explains most; None where none explains enough."""
-    candidates = find_fittings(rows.dip_m, found.left_m3, found.design, rows.sd_m3, longest)
-    for thing, gain in candidates:
-        if gain < LEAST_GAIN:
-            break
-        more = replace(found.state, fittings=(*found.state.fittings, thing))
-        again = _with_free_zero(rows, more, about)
-        if again and found.chi2 - again.chi2 > LEAST_GAIN:
-            return again
-    return None
-
-
-def _tidied(rows, found, about):
-    """The Fit with fewer things, where fewer explain the rows as well."""
-    if len(found.state.fittings) > 1:
-        near = 1.6 * float(np.median(np.diff(rows.dip_m)))
-        pairs = in_other_pairs(found.state.fittings, near)
-        found = _cheaper(rows, found, pairs, about)
-    for one in sorted(found.state.fittings, key=lambda one: abs(one.volume_m3)):
-        rest = tuple(f for f in found.state.fittings if f.volume_m3 != one.volume_m3)
-        found = _cheaper(rows, found, rest, about)
-    return found
-
-
-def _with_sure_fittings(rows, found):
-    """The Fit without things whose volume is no more than its uncertainty, the least sure first."""
-    while found.state.fittings:
-        things = found.state.fittings
-        sizes = np.abs([one.volume_m3 for one in things]) / found.sd("fittings")[2::3]
-        worst = int(np.argmin(sizes))
-        if sizes[worst] > CRITICAL:
-            break
-        rest = things[:worst] + things[worst + 1 :]
-        again = _tried(rows, replace(found.state, fittings=rest))
-        if again is None:
-            break
-        found = again
-    return found
-
-
-def _cheaper(rows, found, fittings, about):
-    if len(fittings) > len(found.state.fittings):
-        return found
-    other = _with_free_zero(rows, replace(found.state, fittings=fittings), about)
-    return other if other and _cost(other) < _cost(found) else found
-
-
-def _is_possible(found):
-    state = found.state
-    largest = LOW_SHARE * np.pi * state.radii_m[0] ** 2
-    return abs(state.zero_m) <= FARTHEST_M and all(
-        one.bottom_m < one.top_m
-        and (
-            one.bottom_m > state.lowest_m + LOW_M
-            or abs(one.volume_m3) < largest * (one.top_m - one.bottom_m)
-        )
-        for one in state.fittings
-    )
-
-
-def _with_free_zero(rows, state, about):
-    """The Fit with the zero free where it stays near, and with things where they are found to be.
-
-    Where that fails, the zero is held, or things where they were looked for; None: all fails.
-    """
-    things = {"kinks"} if state.fittings else set()
-    zero = {"zero"} if len(state.seams_m) and "seams" not in state.free else set()
-    held = state.free - {"zero", "kinks"}
-    for free in dict.fromkeys(
-        map(frozenset, (held | things | zero, held | things, held | zero, held))
-    ):
-        start = state if "zero" in free else replace(state, zero_m=about)
-        again = _tried(rows, replace(start, free=free))
-        if again and _is_possible(again) and abs(again.state.zero_m - about) <= NEAR_M:
-            return again
-    return None
-
-
-def _tried(rows, state):
-    """The Fit, or None where the rows do not determine it."""
-    try:
-        return rows.adjust(state)
-    except SolutionError:
-        return None
-
-
 def _geometry(former, found, rows, used, seams_known):
-    chosen = rows._of(used)
-    found = _with_sure_fittings(chosen, _with_known_zero(chosen, former, found))
+    chosen = rows.of(used)
+    found = with_sure_fittings(chosen, _with_known_zero(chosen, former, found))
     found, other = _with_order(chosen, found)
     seams = found if "seams" in found.state.free else _free_seams(chosen, found)
     if seams is not None and (not seams_known or _are_elsewhere(found, seams)):
         found = seams
     seams_are = "found" if "seams" in found.state.free else "declared"
-    roughness = _roughness(chosen, found)
-    u_density = float(np.hypot(found.sd("density")[0] * roughness, _by_order(found, other)[0]))
+    quantum = former.volume_quantum_m3
+    scale = scale_of_u(found, chosen, quantum)
+    layout, by_order = found.state.layout, _by_order(found, other)
+    u_density = float(np.hypot((found.sd("density") * scale[layout["density"]])[0], by_order[0]))
     t = found.state.density_kg_m3 / u_density
-    head, without = _decide_head(t, u_density), None
     density = Reading(found.state.density_kg_m3, u_density)
+    head, without = _decide_head(t, u_density), None
+    independent = _independent(found)
     dry = _without_head(chosen, found)
+    if head != "without":
+        without = (*_remainders(dry.left_m3), dry.state.radii_m)
     if head == "undecided":
         found, other = _with_usual_density(chosen, former, found), None
     if head == "without":
-        found, other, roughness = dry, None, _roughness(chosen, dry)
-    else:
-        without = (*_remainders(dry.left_m3), dry.state.radii_m)
+        found, other = dry, None
+    scale = scale_of_u(found, chosen, quantum)
+    u_seams = (
+        seams.sd("seams") * scale_of_u(seams, chosen, quantum)[seams.state.layout["seams"]]
+        if seams
+        else None
+    )
     return _as_geometry(
         former, found, rows, used,
-        roughness=roughness, density=density, head=head, t=t, without=without, seams=seams,
-        seams_are=seams_are, by_order=_by_order(found, other)[1],
+        scale=scale, density=density, head=head, t=t, without=without,
+        seams=_seam_readings(seams.state if seams else found.state, u_seams),
+        seams_are=seams_are, by_order=_by_order(found, other)[1], independent=independent,
     )  # fmt: skip
+
+
+def _independent(found):
+    """(density, (n,) radii): their standard deviations if rounding were independent."""
+    return float(found.sd("density")[0]), found.sd("radii")
 
 
 def _with_order(rows, found):
@@ -589,8 +312,8 @@ def _without_head(rows, found):
     """The Fit of the same with the head left out."""
     free = found.state.free - {"density"}
     dry = replace(found.state, density_kg_m3=0.0, free=free)
-    tried = _tried(rows, dry) or _tried(rows, replace(dry, free=free - {"kinks"}))
-    return tried or rows.adjust(replace(dry, free=free - {"kinks", "zero"}))
+    found = tried(rows, dry) or tried(rows, replace(dry, free=free - {"kinks"}))
+    return found or rows.adjust(replace(dry, free=free - {"kinks", "zero"}))
 
 
 def _with_usual_density(rows, former, found):
@@ -599,7 +322,7 @@ def _with_usual_density(rows, former, found):
     if former.liquid_density_kg_m3 is not None:
         usual, sd = former.liquid_density_kg_m3, DECLARED_SD_KG_M3
     state = replace(found.state, density_kg_m3=usual, density_sd_kg_m3=sd)
-    return _tried(rows, state) or found
+    return tried(rows, state) or found
 
 
 def _decide_head(t, u_density):
@@ -612,28 +335,15 @@ def _remainders(left):
     return float(np.sqrt(np.mean(left**2))), float(np.abs(left).max())
 
 
-def _roughness(rows, found):
-    """What u is multiplied by: 1, or more where rows depart by more than their rounding.
-
-    Departures that go on from row to row count for fewer rows than there are: with a correlation c
-    of neighbours by sqrt((1 + c) / (1 - c)).
-    """
-    left = found.left_m3 / rows.sd_m3
-    size = np.sqrt(found.chi2 / found.dof) if found.dof > 0 else 1.0
-    if size < ROUGH:
-        return 1.0
-    c = np.clip(left[1:] @ left[:-1] / (left @ left), 0.0, 0.99)
-    return float(size * np.sqrt((1 + c) / (1 - c)))
-
-
-def _as_geometry(former, found, rows, used, *, roughness, density, head, t, without, seams,
-                 seams_are, by_order):  # fmt: skip
+def _as_geometry(former, found, rows, used, *, scale, density, head, t, without, seams,
+                 seams_are, by_order, independent):  # fmt: skip
     state, layout = found.state, found.state.layout
-    covariance = found.cofactor[layout["radii"], layout["radii"]] * roughness**2
+    radii = layout["radii"]
+    covariance = found.cofactor[radii, radii] * np.outer(scale[radii], scale[radii])
     covariance = covariance + np.outer(by_order, by_order)
-    sd = {name: found.sd(name) * roughness for name in layout}
+    sd = {name: found.sd(name) * scale[part] for name, part in layout.items()}
     rms, largest = _remainders(found.left_m3)
-    chosen = rows._of(used)
+    chosen = rows.of(used)
     edges = state.rings.edges_m
     return UprightGeometry(
         name=former.name,
@@ -643,7 +353,7 @@ def _as_geometry(former, found, rows, used, *, roughness, density, head, t, with
         heights_m=np.diff(edges),
         thickness_m=state.thickness_m,
         zero_m=_zero_reading(state, sd["zero"]),
-        seams_m=_seam_readings(state if seams is None else seams.state, seams, roughness),
+        seams_m=seams,
         seams_are=seams_are,
         density_kg_m3=density,
         head=head,
@@ -658,8 +368,9 @@ def _as_geometry(former, found, rows, used, *, roughness, density, head, t, with
         largest_m3=largest,
         expected_m3=float(np.sqrt(np.mean(chosen.sd_m3**2))),
         without_head=without,
-        roughness=roughness,
+        roughness=roughness(found, chosen),
         state=state,
+        independent_u=independent,
     )
 
 
@@ -670,11 +381,9 @@ def _zero_reading(state, sds):
     return Reading(state.zero_m, np.nan if "base" in state.free else 0.0)
 
 
-def _seam_readings(state, seams, roughness):
+def _seam_readings(state, sds):
     dips = state.rings.edges_m[1:-1]
-    if seams is None:
-        return tuple(Reading(float(dip), np.nan) for dip in dips)
-    sds = seams.sd("seams") * roughness
+    sds = np.full(len(dips), np.nan) if sds is None else sds
     return tuple(Reading(float(d), float(u)) for d, u in zip(dips, sds, strict=True))
 
 

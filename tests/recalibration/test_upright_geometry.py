@@ -13,9 +13,10 @@ from numpy.testing import assert_allclose
 
 from tankcal.recalibration.fittings import Fitting, find_fittings, in_other_pairs
 from tankcal.recalibration.former import FormerRoof, FormerTable
+from tankcal.recalibration.rounding import sd_of_rows
 from tankcal.recalibration.seams import find_seams
 from tankcal.recalibration.table_fit import State
-from tankcal.recalibration.upright_geometry import read_upright, sd_of_rows
+from tankcal.recalibration.upright_geometry import read_upright
 from tankcal.recalibration.upright_shell import Rings
 from tankcal.recalibration.zero import find_zeros
 
@@ -62,9 +63,10 @@ def test_published_example_with_head():
                     [146.708, 293.425, 586.885, 978.261, 1369.710])  # fmt: skip
     off = (1e6 * (found.radii_m - radii_of_s1())).round(1)
     assert off.tolist() == [-0.9, -1.7, -3.8, -6.3, -7.3]
-    assert (1e6 * found.u_m).round().tolist() == [1, 4, 7, 11, 14]
-    density = found.density_kg_m3
-    assert (round(density.value, 1), round(density.u, 1), round(found.t)) == (852.8, 5.3, 160)
+    u_density, u_radii = found.independent_u
+    assert (1e6 * u_radii).round().tolist() == [1, 4, 7, 11, 14]
+    density = found.density_kg_m3.value
+    assert (round(density, 1), round(u_density, 1), round(density / u_density)) == (852.8, 5.3, 160)
     assert found.head == "with"
     assert round(1000 * found.rms_m3, 2) == 0.28
 
@@ -183,7 +185,7 @@ def test_derivatives_of_a_state():
 def test_kinks_in_other_pairs():
     """Two things whose kinks were crossed are two things again."""
     crossed = (Fitting(1.0, 2.2, -1.2), Fitting(1.5, 2.0, 0.5))
-    again = in_other_pairs(crossed, 0.016)
+    again = in_other_pairs(crossed, 0.016, 0.03)
     assert_allclose([(f.bottom_m, f.top_m) for f in again], [(1.0, 1.5), (2.0, 2.2)])
     assert_allclose([f.volume_m3 for f in again], [-0.5, -0.2])
 
