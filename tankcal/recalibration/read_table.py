@@ -88,7 +88,7 @@ def read_table(
     ...     size = courses.write_text("course,height_m,thickness_mm\\n1,1.5,8\\n2,1.5,6\\n")
     ...     read = read_table(table, courses)
     >>> read.geometry.radii_m.round(4).tolist(), read.geometry.head
-    ([6.0, 6.0], 'undecided')
+    ([6.0, 6.0], 'without')
     """
     log = Log()
     former = _former(path, former_toml, log)

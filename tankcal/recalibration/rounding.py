@@ -3,14 +3,14 @@
 As independent errors of q / sqrt(12), q the last digit, it is the covariance of the adjustment.
 But rounding is not independent from row to row: a ring of 1630.0448 L/cm has errors that climb by
 0.0448 L a row and fall back every 22 rows. So the table is rounded again at many places of its last
-digit, with its own steps, and what that does to the unknowns is the other measure; the larger one
-counts.
+digit, with the steps of tanks that it leaves possible, and what that does to the unknowns is the
+other measure; the larger one counts.
 """
 
 import numpy as np
 
 ROUGH = 1.15  # rms over what rounding leaves: above it, rows have more in them than rounding
-DRAWS, SEED = 60, 21
+DRAWS, SEED = 150, 21
 
 
 def sd_of_rows(former):
@@ -44,8 +44,13 @@ def _by_steps(found, rows, quantum):
     if quantum <= 0 or found.dof <= 0:
         return np.ones(len(sds))
     gain = found.cofactor @ (found.design / rows.sd_m3[:, None] ** 2).T
-    shifts = np.random.default_rng(SEED).uniform(0, 1, (DRAWS, 1))
-    places = found.state.volume_m3(rows.dip_m) / quantum + shifts
+    random = np.random.default_rng(SEED)
+    safe = np.where(sds > 0, sds, 1.0)
+    values, vectors = np.linalg.eigh(found.cofactor / np.outer(safe, safe))
+    roots = vectors * np.sqrt(np.maximum(values, 0)) * safe[:, None]
+    moves = random.normal(size=(DRAWS, len(sds))) @ (found.design @ roots).T
+    shifts = random.uniform(0, 1, (DRAWS, 1))
+    places = (found.state.volume_m3(rows.dip_m) + moves) / quantum + shifts
     errors = (np.round(places) - places) * quantum @ gain.T
     moved = np.sqrt(np.mean(errors**2, axis=0))
     return np.maximum(moved / np.where(sds > 0, sds, np.inf), 1.0)

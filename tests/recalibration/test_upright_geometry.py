@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from draws import draws
 from former_tables import SimulatedTank, draw_tank, table_of
 from jacobians import assert_derivative
 from numpy.testing import assert_allclose
@@ -207,29 +208,41 @@ def test_simulated_tables(seed):
 
 
 @pytest.mark.study
-@pytest.mark.parametrize("first", range(0, 200, 20))
-def test_two_hundred_simulated_tables(first, figure):
-    """Simulation: radii within 0.05 mm, density within 3 u, head decided right, in every table."""
-    worst = [_check_drawn(seed) for seed in range(first, first + 20)]
-    figure(f"tables {first} to {first + 19}, largest error of a radius, mm", max(worst))
+def test_many_simulated_tables(figure):
+    """Simulation: radii within 0.05 mm and head decided right in all, density by its u.
+
+    Of 200 normal errors one in two such studies has one beyond 3 u; three or more are a finding.
+    """
+    drawn = [_read_drawn(seed) for seed in range(draws(40, 200))]
+    off, w, heads = (np.array(one) for one in zip(*drawn, strict=True))
+    figure("largest error of a radius, mm", off.max())
+    figure("largest error of a density over its u", np.abs(w).max())
+    assert off.max() < 0.05
+    assert np.all(heads == "with")
+    assert np.sum(np.abs(w) > 3) < 3
+    assert np.sqrt(np.mean(w**2)) < 1.2
 
 
 @pytest.mark.study
-def test_two_hundred_tables_without_head():
-    """Simulation: no head is found in 99 % of tables without one."""
-    right = 0
-    for seed in range(200):
-        tank = draw_tank(np.random.default_rng(1000 + seed), density=0.0)
-        right += read(tank, table_of(tank)).head == "without"
-    assert right >= 198
+def test_many_tables_without_head():
+    """Simulation: 99 % of tables without a head are told so."""
+    count = draws(40, 200)
+    tanks = [draw_tank(np.random.default_rng(1000 + seed), density=0.0) for seed in range(count)]
+    right = sum(read(tank, table_of(tank)).head == "without" for tank in tanks)
+    assert right >= 0.99 * count
 
 
 def _check_drawn(seed):
+    off, w, head = _read_drawn(seed)
+    assert off < 0.05
+    assert abs(w) < 3
+    assert head == "with"
+
+
+def _read_drawn(seed):
+    """(largest error of a radius in mm, error of the density over its u, head) of one tank."""
     tank = draw_tank(np.random.default_rng(seed))
     found = read(tank, table_of(tank))
     off = 1000 * np.abs(found.radii_m - tank.radii_m).max()
-    assert off < 0.05, seed
     density = found.density_kg_m3
-    assert abs(density.value - tank.density_kg_m3) < 3 * density.u, seed
-    assert found.head == "with", seed
-    return off
+    return off, (density.value - tank.density_kg_m3) / density.u, found.head
