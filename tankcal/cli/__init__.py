@@ -14,6 +14,7 @@ from tankcal.cli import (
     reporting,
     running,
     starting,
+    table_reading,
 )
 from tankcal.cli.help_words import argparse_in, put_in_words
 from tankcal.cli.machine import failure, print_json
@@ -35,6 +36,7 @@ a new tank, step by step:
   tankcal report my-tank/results --language es   the papers again, in Spanish
   tankcal lint table.csv        look for mistakes in any capacity table
   tankcal compare old.csv my-tank/results        has the tank changed since its former table?
+  tankcal read-table old.csv --courses courses.csv   radii and head out of a former table
 
 photographs, distances, angles and levels instead of surveyed points:
   tankcal new my-tank --survey photos          (or total-station) write such a job
@@ -107,7 +109,9 @@ def _parser():
     parser.set_defaults(command=None, shown=parser)
     commands = parser.add_subparsers(metavar="COMMAND")
 
-    for room in (running, reporting, starting, importing, planning, linting, comparing, camera):
+    tables = (linting, table_reading, comparing)
+    rooms = (running, reporting, starting, importing, planning, *tables, camera)
+    for room in rooms:
         room.add(commands)
     if words_of_run():
         put_in_words(parser, words_of_run())

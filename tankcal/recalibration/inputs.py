@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
+
 from tankcal.errors import InputError
-from tankcal.job.contract.courses import COLUMNS
-from tankcal.job.entries import read_columns
-from tankcal.job.folder import read_csv
 from tankcal.job.rule_files import named_rule
-from tankcal.job.tables import Log, read_bytes
+from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.recalibration.comparison import compare
+from tankcal.recalibration.read_courses import read_courses
 from tankcal.recalibration.reading import read_former
 from tankcal.record.comparison import ComparisonFile
 
@@ -63,7 +63,7 @@ def compare_files(asked) -> ComparisonFile:
     log = Log()
     old, former = _table(asked.old, asked.former, log)
     recent, new = _table(asked.new, asked.new_former, log)
-    courses = None if asked.courses is None else read_courses(asked.courses, log)
+    courses = None if asked.courses is None else _shell(asked.courses, log)
     rule = None if asked.rule is None else named_rule(asked.rule, log)
     log.stop_if_problems()
     fingerprints = tuple(sha256(_rows_of(one).read_bytes()).hexdigest() for one in (old, recent))
@@ -96,27 +96,15 @@ def _rows_of(path):
     return path.parent / tomllib.loads(path.read_text(encoding="utf-8"))["former"]["file"]
 
 
-def read_courses(path, log):
-    """(heights, thicknesses) in a courses.csv, m, from the bottom up; None after telling `log`.
-
-    Its columns are those of a job; separated by commas, or by semicolons with decimal commas.
-    """
-    path = Path(path)
-    data = read_bytes(path, log)
-    if data is None:
+def _shell(path, log):
+    """(heights, thicknesses) in a courses.csv, m, from the bottom up; None after telling `log`."""
+    found = read_courses(path, log)
+    if found is None:
         return None
-    marks = (";", ",") if b";" in data.split(b"\n", 1)[0] else (",", ".")
-    table = read_csv(path.name, data, *marks, log)
-    if table is None:
-        return None
-    told = len(log.problems)
-    found = read_columns("courses", table, log, COLUMNS)
-    if found.is_empty:
+    if np.isnan(found.heights_m).any():
         expected = message(
-            "compare_no_courses", "no rows; expected one row for each course of the tank, upwards"
+            "compare_no_height",
+            "heights that are not known; expected all of them: tankcal read-table finds the seams",
         )
-        log.problem(path.name, expected)
-    if len(log.problems) > told:
-        return None
-    heights, plates = found.of("height_m"), found.of("thickness_mm")
-    return heights, [one / 1000 for one in plates]
+        log.problem(found.file, expected, None, "height_m")
+    return found.heights_m, found.thickness_m

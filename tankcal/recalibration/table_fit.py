@@ -10,11 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.adjust import adjust
+from tankcal.errors import SolutionError
 from tankcal.recalibration.fittings import Fitting
 from tankcal.recalibration.upright_shell import Rings
 
 ZERO_SD_M, SEAM_SD_M, KINK_SD_M = 0.1, 0.05, 1.0  # so weak that a table decides; never singular
 DENSITY_SD_KG_M3 = 1e5
+MOST_ROUNDS, MOST_HALVINGS, SETTLED = 15, 6, 1e-3  # of chi2
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class State:
         Of "base", "density", "zero", "seams", "kinks": what else than radii and volumes is unknown.
     is_first_order : bool
         Of the head.
+    density_sd_kg_m3 : float
+        Of the density that an adjustment starts with, as an observation of it.
     """
 
     base_m3: float
@@ -61,14 +65,13 @@ class State:
     roof_zone_m: tuple[float, float] | None = None
     free: frozenset = frozenset({"base", "density"})
     is_first_order: bool = True
+    density_sd_kg_m3: float = DENSITY_SD_KG_M3
 
     @property
     def rings(self):
         """The Rings, in dips."""
         heights = np.concatenate([[0.0], self.seams_m, [self.rings_top_m]])
-        return Rings(
-            self.zero_m + heights, self.thickness_m, self.modulus_pa, self.is_first_order
-        )
+        return Rings(self.zero_m + heights, self.thickness_m, self.modulus_pa, self.is_first_order)
 
     def volume_m3(self, dips_m):
         """(rows,) volume below each dip."""
@@ -169,6 +172,8 @@ class Fit:
         Covariance of its unknowns, of rounding alone.
     left_m3 : ndarray, shape (rows,)
         Table less state.
+    sd_m3 : ndarray, shape (rows,)
+        By rounding.
     design : ndarray, shape (rows, u)
     chi2 : float
         Of the rows.
@@ -177,6 +182,7 @@ class Fit:
     state: State
     cofactor: np.ndarray
     left_m3: np.ndarray
+    sd_m3: np.ndarray
     design: np.ndarray
     chi2: float
 
@@ -209,40 +215,48 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     SolutionError
         When the rows do not determine the unknowns.
     """
-    start = state.unknowns
     held, known, about, sds = _priors(state)
-    moving = np.setdiff1d(np.arange(len(start)), held)
-    rows = np.eye(len(start))[known][:, moving]
+    moving = np.setdiff1d(np.arange(len(state.unknowns)), held)
+    observed = np.concatenate([volumes_m3, about])
+    variances = np.concatenate([sd_m3**2, sds**2])
+    rows = np.eye(len(state.unknowns))[known][:, moving]
 
-    def model(x, l):
-        unknowns = start.copy()
-        unknowns[moving] = x
-        now = state.with_unknowns(unknowns)
-        w = np.concatenate([now.volume_m3(dips_m), unknowns[known]]) - l
-        return w, np.vstack([now.design(dips_m)[:, moving], rows]), None
+    def misclosure(now):
+        return np.concatenate([now.volume_m3(dips_m), now.unknowns[known]]) - observed
 
-    found = adjust(
-        model,
-        start[moving],
-        np.concatenate([volumes_m3, about]),
-        np.concatenate([sd_m3**2, sds**2]),
-        max_iterations=30,
-        tolerance=1e-4,
-    )
-    unknowns = start.copy()
-    unknowns[moving] = found.unknowns
-    cofactor = np.zeros((len(start), len(start)))
+    now, w = state, misclosure(state)
+    for _ in range(MOST_ROUNDS):
+        design = np.vstack([now.design(dips_m)[:, moving], rows])
+        found = adjust(_tangent(w, design), np.zeros(len(moving)), np.zeros(len(w)), variances)
+        before, cost = now, w @ (w / variances)
+        step = np.zeros(len(now.unknowns))
+        step[moving] = found.unknowns
+        for _ in range(MOST_HALVINGS):
+            now = before.with_unknowns(before.unknowns + step)
+            w = misclosure(now)
+            if w @ (w / variances) <= cost + SETTLED:
+                break
+            step /= 2
+        if abs(cost - w @ (w / variances)) < SETTLED:
+            break
+    cofactor = np.zeros((len(state.unknowns), len(state.unknowns)))
     cofactor[np.ix_(moving, moving)] = found.cofactor
-    now = state.with_unknowns(unknowns)
     left = volumes_m3 - now.volume_m3(dips_m)
-    return Fit(now, cofactor, left, now.design(dips_m), float(np.sum((left / sd_m3) ** 2)))
+    chi2 = float(np.sum((left / sd_m3) ** 2))
+    return Fit(now, cofactor, left, sd_m3, now.design(dips_m), chi2)
+
+
+def _tangent(w, design):
+    """The linear model of a step, for `adjust`."""
+    return lambda x, l: (w + design @ x - l, design, None)
 
 
 def _priors(state):
     """Unknowns that are held; those that are weakly known, where about, and their sds."""
     layout = state.layout
     sds, held = {}, []
-    for name, sd in (("zero", ZERO_SD_M), ("seams", SEAM_SD_M), ("density", DENSITY_SD_KG_M3)):
+    density_sd = state.density_sd_kg_m3
+    for name, sd in (("zero", ZERO_SD_M), ("seams", SEAM_SD_M), ("density", density_sd)):
         sds |= dict.fromkeys(range(layout[name].start, layout[name].stop), sd)
     for k, one in enumerate(state.fittings):
         place = layout["fittings"].start + 3 * k
@@ -262,3 +276,40 @@ def held_kinks(state, fitting):
     if "kinks" not in state.free:
         return True, True
     return fitting.bottom_m <= state.lowest_m, fitting.top_m >= state.highest_m
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of a table.
+
+    Attributes
+    ----------
+    dip_m, volume_m3, sd_m3 : (rows,) ndarray
+        sd_m3: by rounding.
+    """
+
+    dip_m: np.ndarray
+    volume_m3: np.ndarray
+    sd_m3: np.ndarray
+
+    def above(self, dip_m):
+        """Those from a dip on."""
+        return self.of(self.dip_m >= dip_m - 1e-9)
+
+    def of(self, mask):
+        """Those of a mask."""
+        return Rows(self.dip_m[mask], self.volume_m3[mask], self.sd_m3[mask])
+
+    def adjust(self, state):
+        """The Fit of a State to them."""
+        lowest, highest = float(self.dip_m[0]), float(self.dip_m[-1])
+        state = replace(state, lowest_m=lowest, highest_m=highest)
+        return fit(state, self.dip_m, self.volume_m3, self.sd_m3)
+
+
+def tried(rows, state):
+    """The Fit of a State to Rows, or None where they do not determine it."""
+    try:
+        return rows.adjust(state)
+    except SolutionError:
+        return None

@@ -2,7 +2,7 @@
 
 Rows below the highest point of the bottom, and those of a roof's critical zone, are left out; the
 others are adjusted (`table_fit.fit`). What stands in the tank is looked for as pairs of kinks
-(`fittings.find_fitting`), one after the other, until none explains more than rounding does by
+(`fittings.find_fittings`), one after the other, until none explains more than rounding does by
 chance. Then the table is asked whether it has a head, where its zero is, and whether the seams are
 where they were declared to be.
 """
@@ -14,22 +14,18 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.recalibration.fittings import Fitting, find_fitting
-from tankcal.recalibration.table_fit import State, fit, held_kinks
+from tankcal.recalibration.rounding import roughness, scale_of_u, sd_of_rows
+from tankcal.recalibration.table_fit import Rows, State, held_kinks, tried
+from tankcal.recalibration.upright_search import LEAST_GAIN, SAME_ZERO, search, with_sure_fittings
 
 STEEL_PA = 206e9
-LEAST_GAIN = 25.0  # of chi2 by a thing: less is what the best of all pairs gains by chance
-MOST_FITTINGS = 12
-ZEROS_M = np.arange(-0.3, 0.31, 0.05)
 START_DENSITY_KG_M3 = 500.0
+USUAL_KG_M3 = 450.0, 450.0  # of a head that a table cannot tell: about this, with this sd
+DECLARED_SD_KG_M3 = 10.0
 LIQUID_KG_M3 = 500.0  # a head that a table could not have shown of any liquid is undecided
-BY_ORDER = 9.0  # of chi2, by which a head of second order has to fit better
-ROUGH = 1.15  # rms over what rounding leaves: above it, rows have more in them than rounding
 FEWEST_ROWS = 3  # of a ring
-SAME_ZERO = 3.0  # standard deviations
-BOTTOM_SHARE = 0.6  # of the first ring, that a bottom may reach up to
-BOTTOM_TRIES = 40
-EDGE_M = 0.1  # below the first seam: where rows of the first ring end, the zero being unknown
+BY_ORDER = 1.0  # of chi2, by which the head of second order has to fit better
+ORDER_IS_CLEAR = 9.0
 
 
 @dataclass(frozen=True)
@@ -70,7 +66,8 @@ class UprightGeometry:
     heights_m, thickness_m : ndarray, shape (n,)
         Of the rings that the table reaches.
     zero_m : Reading
-        Dip of the bottom of the first ring.
+        Dip of the bottom of the first ring; u is 0 where the table is empty at its zero and begins
+        there, nan where that cannot be told because the seams are found, too.
     seams_m : tuple of Reading
         Dips of the seams, each looked for by itself; u is large where nothing jumps there.
     seams_are : {"declared", "found"}
@@ -96,6 +93,9 @@ class UprightGeometry:
         What u was multiplied by because rows have more in them than rounding; 1: nothing.
     state : State
         All of it, as a function of the dip.
+    independent_u : (float, ndarray)
+        Standard deviations of density and (n,) radii if each row were rounded independently of the
+        others; u is never less (`rounding`).
     """
 
     name: str
@@ -122,30 +122,18 @@ class UprightGeometry:
     without_head: tuple[float, float, np.ndarray] | None
     roughness: float
     state: State
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """The rows of a table that are used."""
-
-    dip_m: np.ndarray
-    volume_m3: np.ndarray
-    sd_m3: np.ndarray
-
-    def above(self, dip_m):
-        return self._of(self.dip_m >= dip_m - 1e-9)
-
-    def _of(self, mask):
-        return _Rows(self.dip_m[mask], self.volume_m3[mask], self.sd_m3[mask])
-
-    def adjust(self, state):
-        lowest, highest = float(self.dip_m[0]), float(self.dip_m[-1])
-        state = replace(state, lowest_m=lowest, highest_m=highest)
-        return fit(state, self.dip_m, self.volume_m3, self.sd_m3)
+    independent_u: tuple[float, np.ndarray]
 
 
 def read_upright(
-    former, heights_m, thickness_m, *, modulus_pa=STEEL_PA, known=(), lowest_m=None, seams_known=True
+    former,
+    heights_m,
+    thickness_m,
+    *,
+    modulus_pa=STEEL_PA,
+    known=(),
+    lowest_m=None,
+    seams_known=True,
 ):
     """Radii, density of the head, zero, things in the tank: out of a table.
 
@@ -173,34 +161,19 @@ def read_upright(
     """
     heights, plates = np.asarray(heights_m, float), np.asarray(thickness_m, float)
     volume = former.volume_m3 - sum((one.volume_below_m3(former.height_m) for one in known), 0.0)
-    rows = _Rows(former.height_m, volume, sd_of_rows(former))
+    rows = Rows(former.height_m, volume, sd_of_rows(former))
     zone = former.roof.critical_m if former.roof else None
     used = np.ones(len(volume), dtype=bool)
     if zone is not None:
         used = (rows.dip_m < zone[0]) | (rows.dip_m > zone[1])
-    usable = rows._of(used)
+    empty = rows.volume_m3 <= 0
+    if np.count_nonzero(empty) > 1:  # dips below the bottom
+        used &= ~empty
+    usable = rows.of(used)
     state = _start(usable, heights, plates, modulus_pa, zone)
-    found = _search(usable, state, lowest_m)
+    found = search(usable, state, lowest_m)
     used &= rows.dip_m >= found.state.lowest_m - 1e-9
     return _geometry(former, found, rows, used, seams_known)
-
-
-def sd_of_rows(former):
-    """(rows,) standard deviations of a table's volumes by its last digits.
-
-    Dips on a regular step are what the table was made for; others were rounded, too.
-    """
-    dips, volumes = former.height_m, former.volume_m3
-    finest = 1e-7 + 1e-12 * float(np.abs(volumes).max())
-    own = max(former.volume_quantum_m3, finest) / np.sqrt(12)
-    step = np.diff(dips)
-    usual = np.median(step)
-    count = np.round(step / usual)
-    is_even = np.abs(step - count * usual) < 0.01 * max(former.height_quantum_m, 1e-7)
-    if is_even.mean() > 0.9:
-        return np.full(len(dips), own)
-    slope = np.gradient(volumes, dips)
-    return np.hypot(own, slope * former.height_quantum_m / np.sqrt(12))
 
 
 def _start(rows, heights, plates, modulus, zone):
@@ -238,163 +211,68 @@ def _start(rows, heights, plates, modulus, zone):
     )
 
 
-def _search(rows, state, lowest_m):
-    """The Fit of all that is found in the rows."""
-    if lowest_m is not None:
-        return _with_fittings(rows.above(lowest_m), state)
-    lowest = _lowest_row(rows, state)
-    found = _with_fittings(rows.above(lowest), state)
-    if lowest > rows.dip_m[0]:
-        more = replace(found.state, lowest_m=float(rows.dip_m[0]))
-        try:
-            whole = _with_fittings(rows, more, at_most=len(found.state.fittings) + 1)
-        except SolutionError:
-            return found
-        if _is_by_rounding(rows, whole) and _is_enough(rows, found, whole):
-            return whole
-    return found
-
-
-def _is_enough(rows, found, whole):
-    """Whether rows far more than their new unknowns are explained by these."""
-    return len(rows.dip_m) - len(found.left_m3) > 10 * (
-        len(whole.state.unknowns) - len(found.state.unknowns)
-    )
-
-
-def _is_by_rounding(rows, found):
-    """Whether nothing is left but rounding: as a whole, and at the worst row."""
-    worst = np.abs(found.left_m3 / rows.sd_m3).max()
-    return found.chi2 < ROUGH**2 * max(found.dof, 1) and worst < np.sqrt(3) * 1.25
-
-
-def _lowest_row(rows, state):
-    """Dip from which on the first ring's rows are those of one cut: above the bottom's highest.
-
-    A parabola through the upper rows of the ring is taken downwards as far as it leaves rounding.
-    """
-    first = rows.dip_m <= state.seams_m[0] - EDGE_M if len(state.seams_m) else rows.dip_m >= 0
-    ring = rows._of(first)
-    most = BOTTOM_SHARE * ring.dip_m[-1]
-    tries = np.flatnonzero(ring.dip_m <= most)
-    if len(ring.dip_m) < 8 or len(tries) == 0:
-        return float(rows.dip_m[0])
-    if _is_one_cut(ring):
-        return float(ring.dip_m[0])
-    for place in _halving(tries):
-        if _is_one_cut(ring.above(ring.dip_m[place])):
-            return float(ring.dip_m[place])
-    return float(rows.dip_m[0])
-
-
-def _halving(tries):
-    """At most BOTTOM_TRIES of the rows, rising; closer together at the bottom."""
-    last = len(tries) - 1
-    places = np.round(last * np.linspace(0, 1, BOTTOM_TRIES) ** 1.5).astype(int)
-    return tries[np.unique(places)]
-
-
-def _is_one_cut(ring):
-    """Whether a parabola leaves no more than rounding of rows."""
-    if len(ring.dip_m) < 5:
-        return False
-    x = (ring.dip_m - ring.dip_m[0]) / (ring.dip_m[-1] - ring.dip_m[0])
-    basis = np.vander(x, 3) / ring.sd_m3[:, None]
-    value = (ring.volume_m3 - ring.volume_m3[0]) / ring.sd_m3
-    left = value - basis @ np.linalg.lstsq(basis, value, rcond=None)[0]
-    dof = len(x) - 3
-    is_rounding = np.abs(left).max() < np.sqrt(3) * 1.25
-    lower = left[: max(len(left) // 4, 2)]  # a bottom shows here first
-    return (
-        is_rounding
-        and left @ left < dof + 4 * np.sqrt(dof)
-        and abs(lower.sum()) < 4 * np.sqrt(len(lower))
-    )
-
-
-def _with_fittings(rows, state, at_most=MOST_FITTINGS):
-    """The Fit with the things that the rows show, one looked for after the other."""
-    found = _with_zero(rows, state)
-    while len(found.state.fittings) < at_most:
-        thing, gain = find_fitting(rows.dip_m, found.left_m3, found.design, rows.sd_m3)
-        rough = max(found.chi2 / max(found.dof, 1), 1.0) if found.dof else 1.0
-        if gain < LEAST_GAIN or found.dof < 6 or gain < 0.02 * rough * found.dof:
-            break
-        again = _with_thing(rows, found, thing)
-        if again is None or found.chi2 - again.chi2 < LEAST_GAIN:
-            break
-        found = again
-    return found
-
-
-def _with_thing(rows, found, thing):
-    """The Fit with one thing more: where it is found to be, or else where it was looked for."""
-    state = replace(found.state, fittings=(*found.state.fittings, thing))
-    free = state.free | {"kinks"}
-    for kinds in (free, free - {"kinks"}):
-        try:
-            again = rows.adjust(replace(state, free=kinds))
-        except SolutionError:
-            continue
-        if all(one.bottom_m < one.top_m for one in again.state.fittings):
-            return again
-    return None
-
-
-def _with_zero(rows, state):
-    """The Fit from the best of some zeros; free from there on, where that can be found."""
-    held = replace(state, free=state.free - {"zero", "kinks"})
-    zeros = ZEROS_M if len(state.seams_m) else [0.0]
-    tried = []
-    for zero in [state.zero_m, *zeros]:
-        try:
-            tried.append(rows.adjust(replace(held, zero_m=float(zero))))
-        except SolutionError:
-            continue
-    if not tried:
-        return rows.adjust(held)
-    best = min(tried, key=lambda one: one.chi2)
-    kinks = {"kinks"} if state.fittings else set()
-    if not len(state.seams_m):
-        return best
-    try:
-        return rows.adjust(replace(best.state, free=best.state.free | {"zero"} | kinks))
-    except SolutionError:
-        return best
-
-
 def _geometry(former, found, rows, used, seams_known):
-    chosen = rows._of(used)
-    found = _with_order(chosen, found)
-    found = _with_known_zero(chosen, former, found)
-    seams = _free_seams(chosen, found)
-    seams_are = "declared"
+    chosen = rows.of(used)
+    found = with_sure_fittings(chosen, _with_known_zero(chosen, former, found))
+    found, other = _with_order(chosen, found)
+    seams = found if "seams" in found.state.free else _free_seams(chosen, found)
     if seams is not None and (not seams_known or _are_elsewhere(found, seams)):
-        found, seams_are = seams, "found"
-    roughness = _roughness(chosen, found)
-    u_density = float(found.sd("density")[0]) * roughness
+        found = seams
+    seams_are = "found" if "seams" in found.state.free else "declared"
+    quantum = former.volume_quantum_m3
+    scale = scale_of_u(found, chosen, quantum)
+    layout, by_order = found.state.layout, _by_order(found, other)
+    u_density = float(np.hypot((found.sd("density") * scale[layout["density"]])[0], by_order[0]))
     t = found.state.density_kg_m3 / u_density
+    density = Reading(found.state.density_kg_m3, u_density)
     head, without = _decide_head(t, u_density), None
+    independent = _independent(found)
     dry = _without_head(chosen, found)
     if head != "without":
-        without = _remainders(dry.left_m3) + (dry.state.radii_m,)
-    density = Reading(found.state.density_kg_m3, u_density)
+        without = (*_remainders(dry.left_m3), dry.state.radii_m)
+    if head == "undecided":
+        found, other = _with_usual_density(chosen, former, found), None
     if head == "without":
-        found, roughness = dry, _roughness(chosen, dry)
+        found, other = dry, None
+    scale = scale_of_u(found, chosen, quantum)
+    u_seams = (
+        seams.sd("seams") * scale_of_u(seams, chosen, quantum)[seams.state.layout["seams"]]
+        if seams
+        else None
+    )
     return _as_geometry(
         former, found, rows, used,
-        roughness=roughness, density=density, head=head, t=t, without=without, seams=seams,
-        seams_are=seams_are,
+        scale=scale, density=density, head=head, t=t, without=without,
+        seams=_seam_readings(seams.state if seams else found.state, u_seams),
+        seams_are=seams_are, by_order=_by_order(found, other)[1], independent=independent,
     )  # fmt: skip
 
 
+def _independent(found):
+    """(density, (n,) radii): their standard deviations if rounding were independent."""
+    return float(found.sd("density")[0]), found.sd("radii")
+
+
 def _with_order(rows, found):
-    """The Fit with the head of the order that the table was made with; the first, when it is mum."""
+    """The Fit with the head of the order that leaves less, and that of the other one.
+
+    The first order where both do as well; the other is None where it is clearly worse.
+    """
     try:
-        other = rows.adjust(replace(found.state, is_first_order=False))
+        second = rows.adjust(replace(found.state, is_first_order=False))
     except SolutionError:
-        return found
-    return other if found.chi2 - other.chi2 > BY_ORDER else found
+        return found, None
+    better = found.chi2 - second.chi2
+    first, last = (second, found) if better > BY_ORDER else (found, second)
+    return first, last if abs(better) < ORDER_IS_CLEAR else None
+
+
+def _by_order(found, other):
+    """(sd of density, (n,) of radii) because the order of the head is not known."""
+    if other is None:
+        return 0.0, np.zeros(len(found.state.radii_m))
+    density = abs(found.state.density_kg_m3 - other.state.density_kg_m3)
+    return density / np.sqrt(3), (found.state.radii_m - other.state.radii_m) / np.sqrt(3)
 
 
 def _with_known_zero(rows, former, found):
@@ -433,7 +311,18 @@ def _are_elsewhere(found, seams):
 def _without_head(rows, found):
     """The Fit of the same with the head left out."""
     free = found.state.free - {"density"}
-    return rows.adjust(replace(found.state, density_kg_m3=0.0, free=free))
+    dry = replace(found.state, density_kg_m3=0.0, free=free)
+    found = tried(rows, dry) or tried(rows, replace(dry, free=free - {"kinks"}))
+    return found or rows.adjust(replace(dry, free=free - {"kinks", "zero"}))
+
+
+def _with_usual_density(rows, former, found):
+    """The Fit with the declared density, or that of some liquid or none: the table cannot tell."""
+    usual, sd = USUAL_KG_M3
+    if former.liquid_density_kg_m3 is not None:
+        usual, sd = former.liquid_density_kg_m3, DECLARED_SD_KG_M3
+    state = replace(found.state, density_kg_m3=usual, density_sd_kg_m3=sd)
+    return tried(rows, state) or found
 
 
 def _decide_head(t, u_density):
@@ -446,27 +335,15 @@ def _remainders(left):
     return float(np.sqrt(np.mean(left**2))), float(np.abs(left).max())
 
 
-def _roughness(rows, found):
-    """What u is multiplied by: 1, or more where rows depart by more than their rounding.
-
-    Departures that go on from row to row count for fewer rows than there are: with a correlation c
-    of neighbours by sqrt((1 + c) / (1 - c)).
-    """
-    left = found.left_m3 / rows.sd_m3
-    size = np.sqrt(found.chi2 / found.dof) if found.dof > 0 else 1.0
-    if size < ROUGH:
-        return 1.0
-    c = np.clip(left[1:] @ left[:-1] / (left @ left), 0.0, 0.99)
-    return float(size * np.sqrt((1 + c) / (1 - c)))
-
-
-def _as_geometry(former, found, rows, used, *, roughness, density, head, t, without, seams,
-                 seams_are):  # fmt: skip
+def _as_geometry(former, found, rows, used, *, scale, density, head, t, without, seams,
+                 seams_are, by_order, independent):  # fmt: skip
     state, layout = found.state, found.state.layout
-    covariance = found.cofactor[layout["radii"], layout["radii"]] * roughness**2
-    sd = {name: found.sd(name) * roughness for name in layout}
+    radii = layout["radii"]
+    covariance = found.cofactor[radii, radii] * np.outer(scale[radii], scale[radii])
+    covariance = covariance + np.outer(by_order, by_order)
+    sd = {name: found.sd(name) * scale[part] for name, part in layout.items()}
     rms, largest = _remainders(found.left_m3)
-    chosen = rows._of(used)
+    chosen = rows.of(used)
     edges = state.rings.edges_m
     return UprightGeometry(
         name=former.name,
@@ -475,8 +352,8 @@ def _as_geometry(former, found, rows, used, *, roughness, density, head, t, with
         covariance_m2=covariance,
         heights_m=np.diff(edges),
         thickness_m=state.thickness_m,
-        zero_m=Reading(state.zero_m, *sd["zero"]) if len(sd["zero"]) else Reading(state.zero_m, 0.0),
-        seams_m=_seam_readings(state if seams is None else seams.state, seams, roughness),
+        zero_m=_zero_reading(state, sd["zero"]),
+        seams_m=seams,
         seams_are=seams_are,
         density_kg_m3=density,
         head=head,
@@ -491,16 +368,22 @@ def _as_geometry(former, found, rows, used, *, roughness, density, head, t, with
         largest_m3=largest,
         expected_m3=float(np.sqrt(np.mean(chosen.sd_m3**2))),
         without_head=without,
-        roughness=roughness,
+        roughness=roughness(found, chosen),
         state=state,
+        independent_u=independent,
     )
 
 
-def _seam_readings(state, seams, roughness):
+def _zero_reading(state, sds):
+    """Zero, with u 0 where the table is empty at its zero, nan where seams are not known."""
+    if len(sds):
+        return Reading(state.zero_m, float(sds[0]))
+    return Reading(state.zero_m, np.nan if "base" in state.free else 0.0)
+
+
+def _seam_readings(state, sds):
     dips = state.rings.edges_m[1:-1]
-    if seams is None:
-        return tuple(Reading(float(dip), np.nan) for dip in dips)
-    sds = seams.sd("seams") * roughness
+    sds = np.full(len(dips), np.nan) if sds is None else sds
     return tuple(Reading(float(d), float(u)) for d, u in zip(dips, sds, strict=True))
 
 

@@ -1,12 +1,13 @@
 """The shell of an upright tank as a table has it: rings, and the head of the liquid in them.
 
 Liquid of density rho up to the dip h widens a ring of unloaded inside radius r and plate t, at the
-dip z, by K rho (h - z), K = g r^2 / (E t). The volume between the bottom of the first ring and h is
+dip z, by K rho (h - z), K = g r^2 / (E t). Between the bottom of the first ring and h are
 
-    W(h) = sum over rings of pi [r^2 u + r K rho u^2 + K^2 rho^2 u^3 / 3],  u from h - end to h - bottom
+    W(h) = sum over rings of pi [r^2 u + r K rho u^2 + K^2 rho^2 u^3 / 3]
 
-with end the ring's top or h, whichever is lower. The last term is 1e-4 of the head's volume; the
-head of the first order leaves it out, and W is then quadratic within a ring.
+between u = h - end and h - bottom, with end the ring's top or h, whichever is lower. The last
+term is 1e-4 of the head's volume; the head of the first order leaves it out, and W is then
+quadratic within a ring.
 """
 
 from dataclasses import dataclass
