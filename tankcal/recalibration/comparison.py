@@ -101,7 +101,7 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
     >>> former = FormerTable("old.csv", dips, 100 * dips, U_m3=0.2 * dips, common=0.0)
     >>> new = FormerTable("new.csv", dips, 100.05 * dips, U_m3=0.15 * dips)
     >>> found = compare(former, new)
-    >>> found.verdict, round(found.rows.d_m3[-1], 3), round(found.rows.E_n[-1], 2)
+    >>> found.verdict, round(float(found.rows.d_m3[-1]), 3), round(float(found.rows.E_n[-1]), 2)
     ('keep', 0.4, 0.2)
     """
     c = _common(former, new)
