@@ -11,6 +11,7 @@ from tankcal.record.camera_parameters import ParametersFile
 from tankcal.record.camera_product import ProductFile
 from tankcal.record.camera_stability import StabilityFile
 from tankcal.record.camera_versions import CAMERA
+from tankcal.record.comparison import COMPARISON, ComparisonFile
 from tankcal.record.making import Record
 from tankcal.record.plan import PLAN, PlanFile
 from tankcal.record.schema import json_schema
@@ -25,6 +26,7 @@ SAVED = (
     (CAMERA, "product", ProductFile),
     (PLAN, None, PlanFile),
     (WALL_PLAN, None, WallPlanFile),
+    (COMPARISON, None, ComparisonFile),
 )
 
 
@@ -77,7 +79,7 @@ def _keys_of_schema(schema, root, path, which):
 
 
 DOCS = Path(__file__).parents[1] / "docs" / "saved-keys.md"
-HEAD = """# Every key of `record.json`, `camera.json` and `plan.json`
+HEAD = """# Every key of `record.json`, `camera.json`, `plan.json` and `comparison.json`
 
 Made from the dataclasses that are saved (`make schemas`), as the JSON schemas in
 `tankcal/record/schemas/` are. What belongs together is told in [the record](record-format.md). A

@@ -7,12 +7,14 @@ import sys
 import tankcal
 from tankcal.cli import (
     camera,
+    comparing,
     importing,
     linting,
     planning,
     reporting,
     running,
     starting,
+    table_reading,
     verifying,
 )
 from tankcal.cli.help_words import argparse_in, put_in_words
@@ -34,7 +36,9 @@ a new tank, step by step:
   tankcal run my-tank/job.xlsx  the same, from the workbook
   tankcal report my-tank/results --language es   the papers again, in Spanish
   tankcal lint table.csv        look for mistakes in any capacity table
-  tankcal verify my-tank/results               do the files of a run belong together?
+  tankcal read-table old.csv --courses courses.csv   radii and head out of a former table
+  tankcal compare old.csv my-tank/results        has the tank changed since its former table?
+  tankcal verify my-tank/results                 do the files of a run belong together?
 
 photographs, distances, angles and levels instead of surveyed points:
   tankcal new my-tank --survey photos          (or total-station) write such a job
@@ -107,7 +111,9 @@ def _parser():
     parser.set_defaults(command=None, shown=parser)
     commands = parser.add_subparsers(metavar="COMMAND")
 
-    for room in (running, reporting, starting, importing, planning, linting, verifying, camera):
+    tables = (linting, table_reading, comparing, verifying)
+    rooms = (running, reporting, starting, importing, planning, *tables, camera)
+    for room in rooms:
         room.add(commands)
     if words_of_run():
         put_in_words(parser, words_of_run())

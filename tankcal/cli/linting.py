@@ -20,7 +20,10 @@ def add(commands):
         epilog="exit status: 0 no errors (there may be warnings); 2 errors found, or no table.",
     )
     lint.add_argument(
-        "file", metavar="FILE", help="a CSV file, an Excel workbook (.xlsx), or a record.json"
+        "file",
+        metavar="FILE",
+        help="a CSV file, an Excel workbook (.xlsx), a PDF with the table as text, or a "
+        "record.json",
     )
     lint.add_argument("--sheet", metavar="NAME", help="of a workbook (default: the longest table)")
     for name, unit, what in (

@@ -12,11 +12,14 @@ def add(commands):
         "report",
         help="write the papers again, from a record",
         description="Write workbook, notebook, PDFs, web page and CSV files again, all or "
-        "nothing, from record.json alone: nothing is computed again.",
+        "nothing, from record.json alone, or the papers of a comparison from comparison.json: "
+        "nothing is computed again.",
         epilog="exit status: 0 done; 2 the record, the language or the letterhead cannot be used. "
         "Then nothing is written.",
     )
-    report.add_argument("record", metavar="RECORD", help="a record.json, or a folder of results")
+    report.add_argument(
+        "record", metavar="RECORD", help="a record.json or comparison.json, or a folder of results"
+    )
     report.add_argument(
         "--out",
         metavar="DIR",
@@ -52,9 +55,19 @@ def letterhead_of(options):
 
 def _report(options):
     from tankcal.report import outputs
+    from tankcal.report.comparison import comparison_file, rebuild
 
     show = Progress(options.quiet)
     letterhead = letterhead_of(options)
+    compared = comparison_file(options.record)
+    if compared is not None:
+        language = outputs.known_language(options.language)
+        speak(language)
+        out = Path(options.out) if options.out else compared.parent
+        paths = rebuild(compared, out, language, show.step, letterhead)
+        show.end()
+        print_paths(out, paths)
+        return
     source = outputs.record_file(options.record)
     out = Path(options.out) if options.out else source.parent
     if options.language in LANGUAGES:

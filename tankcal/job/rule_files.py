@@ -2,7 +2,10 @@
 
 A rule is a TOML file (docs/job-format.md): [rule] says what it is, each [uncertainty.NAME] is a
 limit of the expanded uncertainty, each [deviation.NAME] one of the deviation from a stated volume.
+[reference_height.NAME] and [period.NAME] are of a new table beside a former one.
 """
+
+from pathlib import Path
 
 from tankcal.job.contract.shorthand import choice, positive
 from tankcal.job.entries import read_section
@@ -13,17 +16,20 @@ from tankcal.messages import message
 from tankcal.tank.rules.model import (
     DEVIATION_OF,
     GUARDS,
+    PERIOD_OF,
     RELATIVE_TO,
     SIDES,
     TANKS,
     UNCERTAINTY_OF,
     DeviationLimit,
+    Period,
+    ReferenceHeightLimit,
     Rule,
     UncertaintyLimit,
 )
 from tankcal.text.shipped import shipped_folder
 
-# The keys of a decision rule's file: [rule], [uncertainty.NAME] and [deviation.NAME].
+# The keys of a decision rule's file: [rule], and [PART.NAME] for the parts of LIMITS.
 
 RULE = (
     Field("name", "text", "name of the rule", required=True),
@@ -54,6 +60,15 @@ LIMITS = {
         choice("guard", "width of the guard band", GUARDS, required=True),
         *_SHARED,
     ),
+    "reference_height": (
+        positive("limit_mm", "largest change of the reference height", 1e4, required=True),
+        *_SHARED,
+    ),
+    "period": (
+        choice("of", "what may become so old", PERIOD_OF, required=True),
+        positive("years", "oldest that a table may become", 1e3, required=True),
+        *_SHARED,
+    ),
 }
 
 
@@ -75,33 +90,67 @@ def shipped_rule(name):
     return rule
 
 
+def named_rule(name, log):
+    """(Rule, file name) of a shipped rule's name or the path of a file; None after telling `log`.
+
+    name  such as "france_2020_recalibration" or "rules/house.toml"
+    """
+    if name in shipped_names():
+        return shipped_rule(name), f"{name}{_ENDING}"
+    path = Path(name)
+    if name.lower().endswith(_ENDING) and path.is_file():
+        data = read_bytes(path, log, MAX_SETTINGS_BYTES)
+        rule = None if data is None else parse_rule(path.name, data, log)
+        return None if rule is None else (rule, path.name)
+    _tell_unknown("--rule", None, None, name, message("no_rule_file_there", "no such file"), log)
+    return None
+
+
 def find_rule(raw, name, log):
     """(Rule, (file, SHA-256, size) or None) that table.rule names; None after telling `log`.
 
     raw   RawJob, beside whose settings a house rule lies     name  as the field says: no path
     The second is None for a rule that ships with tankcal.
     """
-    if name in shipped_names():
-        return shipped_rule(name), None
     value = raw.settings["table"]["rule"]
+    place = (raw.settings_file, value.row, "table.rule")
+    if name in shipped_names():
+        return _of_one_table(shipped_rule(name), None, place, log)
     path = raw.folder / name
     is_file_name = name.lower().endswith(_ENDING)
     if not (is_file_name and path.exists()):
-        missing = message("found_rule", "found {name!r}", name=name)
-        if is_file_name:
-            missing = message("no_rule_file", "no such file beside the job")
-        expected = message(
-            "no_such_rule",
-            "{missing}; expected a .toml file there, or one of {rules}{hint}",
-            missing=missing,
-            rules=[*shipped_names()],
-            hint=nearest(name.removesuffix(_ENDING), shipped_names()),
-        )
-        log.problem(raw.settings_file, expected, value.row, "table.rule")
+        missing = message("no_rule_file", "no such file beside the job")
+        _tell_unknown(*place, name, missing, log)
         return None
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
     rule = None if data is None else parse_rule(name, data, log)
-    return None if rule is None else (rule, fingerprint(name, data))
+    return None if rule is None else _of_one_table(rule, fingerprint(name, data), place, log)
+
+
+def _of_one_table(rule, file, place, log):
+    """(Rule, file) of a rule that limits something of one table; None after telling `log`."""
+    if rule.uncertainty or rule.deviation:
+        return rule, file
+    expected = message(
+        "rule_of_two_tables",
+        "limits nothing of one table; expected [uncertainty.NAME] or [deviation.NAME] in it (rules "
+        "of periods are for tankcal compare)",
+    )
+    log.problem(place[0], expected, *place[1:])
+    return None
+
+
+def _tell_unknown(file, row, column, name, no_file, log):
+    is_file_name = name.lower().endswith(_ENDING)
+    missing = no_file if is_file_name else message("found_rule", "found {name!r}", name=name)
+    expected = message(
+        "no_such_rule",
+        "{missing}; expected a .toml file there, or one of {rules}{hint}",
+        missing=missing,
+        rules=[*shipped_names()],
+        hint=nearest(name.removesuffix(_ENDING), shipped_names()),
+    )
+    log.problem(file, expected, row, column)
 
 
 def parse_rule(file, data, log):
@@ -120,7 +169,8 @@ def parse_rule(file, data, log):
             hint = nearest(part, (*LIMITS, "rule"))
             expected = message(
                 "unknown_section_of_rule",
-                "unknown section; expected [rule], [uncertainty.NAME] or [deviation.NAME]{hint}",
+                "unknown section; expected [rule] or one of {sections}{hint}",
+                sections=[f"[{one}.NAME]" for one in LIMITS],
                 hint=hint,
             )
             log.problem(file, expected, row, f"[{section}]")
@@ -175,7 +225,12 @@ def _tell_contradictions(file, part, section, values, given, row, log):
                 "limit_percent",
                 message("neither_limit", "missing; expected limit_percent or limit_m3"),
             )
-        return
+    elif part == "uncertainty":
+        _tell_heights(values, is_given, tell)
+
+
+def _tell_heights(values, is_given, tell):
+    """A problem for a least height, or a percentage, that a limit of U lacks or must not have."""
     is_delivery = values["of"] == "deliveries"
     if is_delivery and not is_given("minimum_height_m"):
         tell(
@@ -221,14 +276,26 @@ def _rule(head, limits):
         )
         for name, values in limits["deviation"]
     )
+    heights = tuple(
+        ReferenceHeightLimit(
+            limit_m=values["limit_mm"] / 1000, **_shared(name, values, rule_verified)
+        )
+        for name, values in limits["reference_height"]
+    )
+    periods = tuple(
+        Period(of=values["of"], years=values["years"], **_shared(name, values, rule_verified))
+        for name, values in limits["period"]
+    )
     return Rule(
         name=head["name"],
         source=head["source"],
-        verified=all(limit.verified for limit in (*uncertainty, *deviation)),
+        verified=all(one.verified for one in (*uncertainty, *deviation, *heights, *periods)),
         remark=head["remark"] or "",
         largest_capacity_m3=head["largest_capacity_m3"],
         uncertainty=uncertainty,
         deviation=deviation,
+        reference_height=heights,
+        periods=periods,
     )
 
 

@@ -1,4 +1,4 @@
-"""Any file as grids of cells: CSV in UTF-8, an Excel workbook, or a record of tankcal."""
+"""Any file as grids of cells: CSV in UTF-8, an Excel workbook, text of a PDF, or a record."""
 
 import csv
 import json
@@ -9,6 +9,8 @@ from tankcal.job.excel import MAX_COLUMNS, Unreadable, read_sheets
 from tankcal.job.folder import decode
 from tankcal.job.sheets import is_read
 from tankcal.job.tables import read_bytes, shown
+from tankcal.linter.pdf_grids import tables_of_text
+from tankcal.linter.pdf_text import pages_of
 from tankcal.messages import message
 from tankcal.record import FORMAT, version_of
 
@@ -39,13 +41,15 @@ def read_grids(path, log):
             path.name,
             message(
                 "lint_not_found",
-                "not found; expected a CSV file, a workbook (.xlsx) or a record.json",
+                "not found; expected a CSV file, a workbook (.xlsx), a PDF or a record.json",
             ),
         )
         return ()
     data = read_bytes(path, log)
     if data is None:
         return ()
+    if data[:5] == b"%PDF-" or path.suffix.lower() == ".pdf":
+        return _pdf(path, log)
     if data[:2] == b"PK" or data[:4] == b"\xd0\xcf\x11\xe0" or path.suffix.lower() == ".xlsx":
         return _workbook(path.name, data, log)
     text = decode(path.name, data, log)
@@ -54,6 +58,19 @@ def read_grids(path, log):
     if path.suffix.lower() == ".json" or text.lstrip()[:1] == "{":
         return _record(path.name, text, log)
     return _csv(path.name, text, log)
+
+
+def _pdf(path, log):
+    tables = tables_of_text(pages_of(path, log) or ())
+    longest = max(tables, key=len, default=())
+    for rows in tables:
+        if rows is not longest and len(rows) > 1:
+            text = message(
+                "lint_other_table",
+                "another table of heights and volumes begins here; only the longest is read",
+            )
+            log.warning(path.name, text, rows[0][0])
+    return tuple(Grid(path.name, tuple(rows), True) for rows in tables)
 
 
 def _workbook(file, data, log):

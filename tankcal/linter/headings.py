@@ -21,6 +21,11 @@ _OTHER = re.compile(
     "correction|correcao|correccion|difference|diferenca|diferencia|increment[o]?|delta|fa[c]?tor|"
     "deviation|desvio|low|high"
 )
+_UNCERTAINTY = re.compile("uncertainty|incerteza|incertidumbre")
+_STANDARD = re.compile("standard|padrao|estandar|tipica")
+_FACTOR = re.compile("coverage|abrangencia|cobertura")
+_OF_SOMETHING_ELSE = re.compile("radius|raio|radio|area|input|entrada|height|altura|dip")
+_COVERAGE = re.compile(r"\bk ?= ?(\d{1,2}(?:[.,]\d{1,4})?)", re.ASCII)
 _RATE = re.compile(r"/ ?(mm|cm|dm|m|in|ft|pol)\b")
 _PARTS = re.compile("proportional|proporciona|interpola|milimetrica")
 
@@ -52,6 +57,45 @@ class Heading:
     text: str
     role: str
     unit: float | None
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """What a heading of a column of uncertainties says.
+
+    is_expanded  U; else the standard uncertainty u
+    unit         size of its unit in m3; None when the heading names none
+    in_percent   of the volume
+    k            coverage factor that the heading names, or None
+    """
+
+    is_expanded: bool
+    unit: float | None
+    in_percent: bool
+    k: float | None
+
+
+def uncertainty_of(cell):
+    """The `Uncertainty` of volumes that a heading announces, or None."""
+    if not isinstance(cell, str):
+        return None
+    words, letters = _words(cell), re.findall(r"[A-Za-z]+", cell)
+    is_named = _any(_UNCERTAINTY, words)
+    if not (is_named or letters[:1] in (["U"], ["u"])) or _RATE.search(_plain(cell)):
+        return None
+    is_foreign = _any(_OF_SOMETHING_ELSE, words) or _unit(HEIGHT_UNITS_M, words) is not None
+    if is_foreign or "/" in cell:
+        return None
+    is_standard = _any(_STANDARD, words) or (not is_named and letters[0] == "u")
+    k = _COVERAGE.search(_plain(cell))
+    k = None if k is None else float(k[1].replace(",", "."))
+    return Uncertainty(not is_standard, _unit(VOLUME_UNITS_M3, words), "%" in cell, k)
+
+
+def is_coverage_factor(cell):
+    """Whether a heading announces coverage factors."""
+    words = _words(cell) if isinstance(cell, str) else []
+    return words[:1] == ["k"] or _any(_FACTOR, words)
 
 
 def heading_of(cell):

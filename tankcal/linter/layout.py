@@ -4,11 +4,18 @@ A printed table repeats its pair of columns across the page, and its heading on 
 pairs are read column by column or row by row, whichever lets the heights rise.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise, zip_longest
 
 from tankcal.errors import HeightError, InputError, Problem
-from tankcal.linter.headings import announces_parts, heading_of, is_unit
+from tankcal.linter.headings import (
+    Uncertainty,
+    announces_parts,
+    heading_of,
+    is_coverage_factor,
+    is_unit,
+    uncertainty_of,
+)
 from tankcal.linter.numbers import (
     MOST_DECIMALS,
     Reading,
@@ -28,13 +35,18 @@ _FEET_MARKS = ("'", '"', "\u2032", "\u2033", "\u2019", "\u201d", "ft")
 
 @dataclass(frozen=True)
 class Entry:
-    """One pair: its row in the file, heading of its volume column, height and volume as read."""
+    """One pair: its row in the file, heading of its volume column, height and volume as read.
+
+    uncertainty, k  as read beside them; None where the table has no such column
+    """
 
     row: int
     height_column: str
     volume_column: str
     height: Reading
     volume: Reading
+    uncertainty: Reading | None = None
+    k: Reading | None = None
 
 
 @dataclass(frozen=True)
@@ -48,6 +60,7 @@ class Table:
     is_ullage      heights fall while volumes rise
     has_heading    False: the first two columns were taken
     is_text        every number is text (CSV)
+    uncertainty    what the heading of its uncertainties says; None: it has none
     """
 
     name: str
@@ -57,16 +70,23 @@ class Table:
     is_ullage: bool
     has_heading: bool
     is_text: bool
+    uncertainty: Uncertainty | None = None
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Positions and headings of a column of heights and a column of volumes."""
+    """Positions and headings of a column of heights and a column of volumes.
+
+    beside  {"uncertainty" or "k": position} of what stands beside them
+    uncertainty  what that heading says, or None
+    """
 
     height: int
     volume: int
     height_heading: object
     volume_heading: object
+    beside: dict = field(default_factory=dict)
+    uncertainty: Uncertainty | None = None
 
 
 @dataclass(frozen=True)
@@ -149,7 +169,25 @@ def _pairs(cells):
             dips = [one for one in heights if one[1].role == "height"] or heights
             pairs.append(Pair(dips[0][0], position, dips[0][1], heading))
             after_volume = True
-    return tuple(pairs)
+    return tuple(_with_uncertainty(pairs, cells))
+
+
+def _with_uncertainty(pairs, cells):
+    """Pairs with the columns of uncertainties and coverage factors that follow their volumes."""
+    starts = [min(pair.height, pair.volume) for pair in pairs if pair.height] + [len(cells)]
+    for pair in pairs:
+        end = min(start for start in starts if start > pair.volume)
+        end = min([end, *(other.volume for other in pairs if other.volume > pair.volume)])
+        said = {n: uncertainty_of(cells[n]) for n in range(pair.volume + 1, end)}
+        known = sorted((n for n in said if said[n]), key=lambda n: not said[n].is_expanded)
+        if not known:
+            yield pair
+            continue
+        beside = {"uncertainty": known[0]}
+        factors = [n for n in said if said[n] is None and is_coverage_factor(cells[n])]
+        if factors:
+            beside["k"] = factors[0]
+        yield replace(pair, beside=beside, uncertainty=said[known[0]])
 
 
 def _trimmed(cells):
@@ -216,11 +254,12 @@ def _table(grid, blocks, numbers, log):
         first.height_heading.role == "ullage",
         blocks[0].has_heading,
         grid.is_text,
+        first.uncertainty,
     )
 
 
 def _cells(grid, block, pairs, log):
-    """For each pair of columns the list of (row, height name, volume name, height, volume)."""
+    """For each pair of columns the list of (row, two names, height, volume, what is beside)."""
     names = _names(block.pairs)
     columns = [[] for _ in pairs]
     _refuse_split_rows(grid, block)
@@ -241,7 +280,13 @@ def _cells(grid, block, pairs, log):
             if not has_digit(height) and not has_digit(volume):
                 continue  # a note between the rows
             told = Reading(None) if is_split else None  # told already
-            column.append((row, names[pair.height], names[pair.volume], height, told or volume))
+            beside = {
+                what: cells[place] if place < len(cells) else None
+                for what, place in pair.beside.items()
+            }
+            column.append(
+                (row, names[pair.height], names[pair.volume], height, told or volume, beside)
+            )
     return columns
 
 
@@ -286,7 +331,7 @@ def _is_in_feet(cell):
 
 
 def _entry(cells, style, in_feet):
-    row, height_name, volume_name, height, volume = cells
+    row, height_name, volume_name, height, volume, beside = cells
     volume = volume if isinstance(volume, Reading) else read_number(volume, style)
     if in_feet:
         try:
@@ -296,7 +341,8 @@ def _entry(cells, style, in_feet):
             height = Reading(None, complaint=str(error))
     else:
         height = read_number(height, style)
-    return Entry(row, height_name, volume_name, height, volume)
+    beside = {what: read_number(cell, style) for what, cell in beside.items()}
+    return Entry(row, height_name, volume_name, height, volume, **beside)
 
 
 def _turns(entries):

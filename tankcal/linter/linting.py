@@ -9,10 +9,10 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.job.tables import Log, nearest
 from tankcal.linter.grids import read_grids
-from tankcal.linter.heights import series_of
-from tankcal.linter.layout import tables_of
-from tankcal.linter.totals import NOTHING_NOMINAL, Nominal, check_totals, units_of
-from tankcal.linter.volumes import volumes_of
+from tankcal.linter.heights import Series, series_of
+from tankcal.linter.layout import Table, tables_of
+from tankcal.linter.totals import NO_UNITS, NOTHING_NOMINAL, Nominal, Units, check_totals, units_of
+from tankcal.linter.volumes import Volumes, volumes_of
 from tankcal.messages import message
 from tankcal.text.display import table_html
 
@@ -76,6 +76,7 @@ def _check_size(table, entries, low, high, main, log):
 
 _PART_OF_LARGEST = 0.5  # of its rows: smaller tables beside it are not capacity tables
 _ROWS_OF_SLOPE = 10
+_SAME_UNIT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,8 @@ def lint(
     Parameters
     ----------
     path : path
-        A CSV file, an Excel workbook (.xlsx), or a record.json of tankcal.
+        A CSV file, an Excel workbook (.xlsx), a PDF with the table as text (with the extra
+        `tankcal[pdf]`), or a record.json of tankcal.
     nominal : Nominal, optional
         Nominal tank to compare total and last row with.
     sheet : str, optional
@@ -180,23 +182,73 @@ def lint(
     >>> print(report.findings[0].problem.expected)
     found 18 after 19; expected volumes that do not fall
     """
+    return checked(path, nominal, sheet).report
+
+
+@dataclass(frozen=True)
+class CheckedTable:
+    """A table with what its checks made of it: all but `table` None where it cannot be read."""
+
+    table: Table
+    series: Series | None
+    volumes: Volumes | None
+    units: Units | None
+
+
+@dataclass(frozen=True)
+class Checked:
+    """The report of a file, and the capacity tables that it is about, the longest ones."""
+
+    report: Report
+    tables: tuple[CheckedTable, ...]
+
+
+def checked(path, nominal=NOTHING_NOMINAL, sheet=None, declared=NO_UNITS, choose=None):
+    """`Checked` tables of a file, as `lint` examines them.
+
+    declared  Units (None for what is not) of columns whose headings name none
+    choose    function of the tables of all sheets that gives the number of the sheet to read;
+              None: that of the longest table
+    """
     path, log = Path(path), Log()
     grids = read_grids(path, log)
     log.stop_if_problems()
-    tables = _tables(path.name, grids, sheet, log)
+    tables = _tables(path.name, grids, sheet, log, choose)
+    tables = [_declared(table, declared, log) for table in tables]
     longest = max(len(table.entries) for table in tables)
-    summaries, areas = [], None
+    summaries, areas, found = [], None, []
     for table in tables:
         if len(table.entries) >= _PART_OF_LARGEST * longest:
-            summary, areas = _check(table, nominal, log)
+            one, summary, areas = _check(table, nominal, log)
             summaries.append(summary)
+            found.append(one)
     for table in tables:
         if len(table.entries) <= MOST_PARTS < longest:
             check_parts(table, areas, log)
-    return Report(_findings(log), tuple(line for line in summaries if line))
+    report = Report(_findings(log), tuple(line for line in summaries if line))
+    return Checked(report, tuple(found))
 
 
-def _tables(file, grids, sheet, log):
+def _declared(table, declared, log):
+    """The table with units that were declared, where its headings name none."""
+    for key, heading in (("height_m", "height_unit_m"), ("volume_m3", "volume_unit_m3")):
+        size, said = getattr(declared, key), getattr(table, heading)
+        if size is not None and said is None:
+            table = replace(table, **{heading: size})
+        elif size is not None and abs(said / size - 1) > _SAME_UNIT:
+            unit = "m" if key == "height_m" else "m3"
+            expected = message(
+                "lint_other_unit",
+                "the heading says units of {said:g} {unit}; declared {declared:g} {unit}",
+                said=said,
+                declared=size,
+                unit=unit,
+            )
+            log.problem(table.name, expected)
+    return table
+
+
+def _tables(file, grids, sheet, log, choose=None):
     """The tables of the sheet to be read; raises InputError where there is none."""
     if sheet is not None:
         names = [grid.sheet for grid in grids if grid.sheet]
@@ -217,6 +269,8 @@ def _tables(file, grids, sheet, log):
         size = max((len(table.entries) for table in tables), default=0)
         found.append((size, tables, told))
     size, tables, told = max(found, key=lambda one: one[0], default=(0, (), Log()))
+    if size and choose is not None:
+        _, tables, told = found[choose([one[1] for one in found])]
     if size == 0:
         expected = message(
             "lint_no_table",
@@ -229,7 +283,7 @@ def _tables(file, grids, sheet, log):
 
 
 def _check(table, nominal, log):
-    """(summary, (least, largest) area in m2) of one table, its faults told."""
+    """(CheckedTable, summary, (least, largest) area in m2) of one table, its faults told."""
     if not table.has_heading:
         log.warning(
             table.name,
@@ -240,7 +294,7 @@ def _check(table, nominal, log):
     series = series_of(table, log)
     volumes = volumes_of(table, series, log) if series else None
     if volumes is None:
-        return "", None
+        return CheckedTable(table, series, None, None), "", None
     units = units_of(table, volumes, log)
     check_totals(table, volumes, units, series.step, nominal, log)
     low, high = sorted(abs(float(h)) * units.height_m for h in volumes.height[[0, -1]])
@@ -254,7 +308,7 @@ def _check(table, nominal, log):
         step=series.step * units.height_m,
         total=volumes.volume[-1] * units.volume_m3,
     )
-    return summary, _areas(volumes, units)
+    return CheckedTable(table, series, volumes, units), summary, _areas(volumes, units)
 
 
 def _areas(volumes, units):

@@ -33,39 +33,60 @@ NOTHING_NOMINAL = Nominal()
 
 @dataclass(frozen=True)
 class Units:
-    """Sizes of the units of a table: m, m3."""
+    """Sizes of the units of a table: m, m3; None where they are not known."""
 
-    height_m: float
-    volume_m3: float
+    height_m: float | None
+    volume_m3: float | None
+
+
+NO_UNITS = Units(None, None)
 
 
 def units_of(table, volumes, log):
     """`Units` by the headings; where one is silent, those that give a tank of usual proportions."""
-    heights = _USUAL_HEIGHT_UNITS_M
-    if table.height_unit_m is not None:
-        heights = [table.height_unit_m]
-    sizes = _USUAL_VOLUME_UNITS_M3
-    if table.volume_unit_m3 is not None:
-        sizes = [table.volume_unit_m3]
-    span = float(volumes.height[-1] - volumes.height[0])
-    total = max(float(volumes.volume[-1]), _LEAST_VOLUME)
-
-    def oddity(pair):
-        height_m = span * pair[0]
-        too_small, too_high = log10(_LOWEST_M / height_m), log10(height_m / _HIGHEST_M)
-        ratio = _slenderness(height_m, total * pair[1])
-        return abs(log10(ratio)) + max(too_small, too_high, 0.0)
-
-    height, volume = min(product(heights, sizes), key=oddity)
-    if len(heights) * len(sizes) > 1:
+    pairs = _possible(table)
+    units = min(pairs, key=lambda one: _oddity(volumes, one))
+    if len(pairs) > 1:
         text = message(
             "lint_no_units",
             "no unit in a heading: taken as heights in {height:g} m, volumes in {volume:g} m3",
-            height=height,
-            volume=volume,
+            height=units.height_m,
+            volume=units.volume_m3,
         )
         log.warning(table.name, text)
-    return Units(height, volume)
+    return units
+
+
+def likely_units(table, volumes):
+    """The `Units` that the headings allow and that give a tank of usual proportions."""
+    return [one for one in _possible(table) if _is_usual(volumes, one)]
+
+
+def _possible(table):
+    heights, sizes = _USUAL_HEIGHT_UNITS_M, _USUAL_VOLUME_UNITS_M3
+    if table.height_unit_m is not None:
+        heights = [table.height_unit_m]
+    if table.volume_unit_m3 is not None:
+        sizes = [table.volume_unit_m3]
+    return [Units(*pair) for pair in product(heights, sizes)]
+
+
+def _oddity(volumes, units):
+    height_m, ratio = _proportions(volumes, units)
+    too_small, too_high = log10(_LOWEST_M / height_m), log10(height_m / _HIGHEST_M)
+    return abs(log10(ratio)) + max(too_small, too_high, 0.0)
+
+
+def _is_usual(volumes, units):
+    height_m, ratio = _proportions(volumes, units)
+    return _LOWEST_M <= height_m <= _HIGHEST_M and _SLIMMEST < ratio < _FLATTEST
+
+
+def _proportions(volumes, units):
+    """(height in m, diameter over height) of a table in units."""
+    height_m = float(volumes.height[-1] - volumes.height[0]) * units.height_m
+    total = max(float(volumes.volume[-1]), _LEAST_VOLUME) * units.volume_m3
+    return height_m, _slenderness(height_m, total)
 
 
 def _slenderness(height_m, volume_m3):

@@ -38,7 +38,8 @@ class FormerTable:
     height_m, volume_m3 : (rows,) ndarray
         Dips, never ullages, strictly rising; volumes as printed.
     height_quantum_m, volume_quantum_m3 : float
-        Value of the last printed digit; 0 where nothing was rounded (a record).
+        Value of the last printed digit; 0 where nothing was rounded (a record, or heights that
+        rise by an even step: such rows stand where they say).
     U_m3 : (rows,) ndarray or None
         Expanded uncertainties; None where none is known.
     k : float
@@ -60,6 +61,12 @@ class FormerTable:
         Of a record: covariance = factor factor'.
     record : dict or None
         The record that it was read from, as plain data.
+    height_rounding_m : (rows,) ndarray or None
+        Largest rounding error of each height: 0 where the steps are even. None: none is rounded.
+    row : (rows,) ndarray of int or None
+        Where each row stands in the file.
+    warnings : tuple of Problem
+        What deserves a look: of the linter, and of reading.
     """
 
     name: str
@@ -81,3 +88,6 @@ class FormerTable:
     kind: str | None = None
     factor_m3: np.ndarray | None = None
     record: dict | None = None
+    height_rounding_m: np.ndarray | None = None
+    row: np.ndarray | None = None
+    warnings: tuple = ()

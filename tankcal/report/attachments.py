@@ -12,7 +12,10 @@ KINDS = {  # name of the file: MIME type, what it is to the paper (PDF 2.0, 7.11
     "capacity.xlsx": (_WORKBOOK, "data"),
     "adjustment.xlsx": (_WORKBOOK, "data"),
     "certificate.xml": ("text/xml", "alternative"),
+    "comparison.json": ("application/json", "source"),
+    "comparison.xlsx": (_WORKBOOK, "data"),
 }
+OF_RECORD = ("record.json", "capacity.xlsx", "adjustment.xlsx", "certificate.xml")
 LARGEST = 20_000_000  # bytes: a larger file stays beside the PDF, which names its digest
 
 
@@ -36,7 +39,7 @@ def beside(folder, described):
 
     described  {name: description}
     """
-    paths = [Path(folder) / name for name in KINDS]
+    paths = [Path(folder) / name for name in described]
     return [
         Attachment(path.name, *KINDS[path.name], described[path.name], sha256(path.read_bytes()))
         for path in paths

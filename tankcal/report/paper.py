@@ -107,7 +107,8 @@ class Paper(PlainPaper):
         is_first = part == "certificate" or self.record["capacity"] is None
         if self._path is None or not is_first:
             return []
-        described = {name: self.word(f"attached.{Path(name).stem}") for name in attachments.KINDS}
+        names = attachments.OF_RECORD
+        described = {name: self.word(f"attached.{Path(name).stem}") for name in names}
         return [one.data() for one in attachments.beside(self._path.parent, described)]
 
     def laboratory(self):

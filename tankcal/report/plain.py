@@ -11,7 +11,7 @@ from tankcal.report.tables import Column, decimals_of_cells
 from tankcal.text.digits import decimals_of, decimals_of_height, fixed, format_significant, shortest
 from tankcal.text.words import marks_of, percent
 
-__all__ = ["Column", "PlainPaper"]
+__all__ = ["Column", "PlainPaper", "words_with_part"]
 _SPACE = "\N{NO-BREAK SPACE}"
 
 
@@ -192,3 +192,17 @@ class PlainPaper:
         caption = self.word(f"captions.{name}", **values)
         figure = with_decimal_mark(figure, self.marks.decimal)
         return blocks.figure(figure, caption, self.word(f"captions.{name}_alt"), width)
+
+
+def words_with_part(words, part):
+    """The words with those of the group `part` before the groups of the same names."""
+    own = words[part]
+    merged = {name: _merged(words.get(name, {}), group) for name, group in own.items()}
+    return {name: group for name, group in words.items() if name != part} | merged
+
+
+def _merged(common, own):
+    """Words of a group with those of its part; groups of groups alike."""
+    if any(isinstance(one, dict) for one in own.values()):
+        return common | {name: common.get(name, {}) | group for name, group in own.items()}
+    return common | own

@@ -6,11 +6,13 @@ import shutil
 import subprocess
 
 import pytest
+from compared_tables import KINDS
 from conftest import EXAMPLE
 
 from tankcal.planning import load_plan, predict
 from tankcal.report import build
 from tankcal.report import planning as planning_papers
+from tankcal.report.comparison import write_comparison
 from tankcal.report.letterhead import load
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
@@ -58,6 +60,13 @@ def test_the_papers_of_a_plan_conform(verapdf, prediction, tmp_path, language):
     planning_papers.write(prediction, tmp_path / "out", language=language)
     names = ("prediction.pdf", "field-sheets.pdf")
     assert_conform(verapdf, [str(tmp_path / "out" / name) for name in names])
+
+
+@pytest.mark.study
+@pytest.mark.parametrize(("language", "kind"), [*zip(LANGUAGES, KINDS, strict=True)])
+def test_the_paper_of_a_comparison_conforms(verapdf, tmp_path, language, kind):
+    write_comparison(KINDS[kind](), tmp_path / "out", language)
+    assert_conform(verapdf, [str(tmp_path / "out" / "comparison.pdf")])
 
 
 def assert_conform(verapdf, paths):

@@ -44,6 +44,16 @@ KEYS = (
 LIGHTEST_KG_M2, HEAVIEST_KG_M2 = 1.0, 1000.0  # aluminium skins have 5, steel double decks 120
 
 
+def upside_down(low, high):
+    """What is said of a critical_top_m that is not above critical_bottom_m."""
+    return message(
+        "roof_upside_down",
+        "found {high:g}; expected above critical_bottom_m = {low:g}",
+        high=high,
+        low=low,
+    )
+
+
 def check_roof(roof, extent, raw, log):
     """All keys or none; critical heights in order and within the shell; a mass that can float."""
     names = [field.name for field in KEYS]
@@ -53,13 +63,7 @@ def check_roof(roof, extent, raw, log):
             tell(log.problem, raw, "roof", name, missing_beside(given[0]))
     low, high = roof["critical_bottom_m"], roof["critical_top_m"]
     if None not in (low, high) and low >= high:
-        expected = message(
-            "roof_upside_down",
-            "found {high:g}; expected above critical_bottom_m = {low:g}",
-            high=high,
-            low=low,
-        )
-        tell(log.problem, raw, "roof", "critical_top_m", expected)
+        tell(log.problem, raw, "roof", "critical_top_m", upside_down(low, high))
         return
     if extent.top_m is not None:
         for name in ("critical_bottom_m", "critical_top_m"):

@@ -99,14 +99,7 @@ def rebuild(record_path, directory, progress=None, language=None, letterhead=Non
         For what is no record, or a language that is not known.
     """
     source = record_file(record_path)
-    if language not in (None, *LANGUAGES):
-        expected = message(
-            "unknown_language",
-            "found {language!r}; expected one of {languages}",
-            language=language,
-            languages=[*LANGUAGES],
-        )
-        raise InputError(Problem("--language", expected))
+    known_language(language)
     record = records.load(source)
 
     def prepare(folder):
@@ -132,6 +125,19 @@ def rebuild(record_path, directory, progress=None, language=None, letterhead=Non
             error=str(error),
         )
         raise InputError(Problem(source.name, found)) from error
+
+
+def known_language(language):
+    """The language, or None; raises InputError for one that is not among LANGUAGES."""
+    if language not in (None, *LANGUAGES):
+        expected = message(
+            "unknown_language",
+            "found {language!r}; expected one of {languages}",
+            language=language,
+            languages=[*LANGUAGES],
+        )
+        raise InputError(Problem("--language", expected))
+    return language
 
 
 def record_file(path):

@@ -7,7 +7,7 @@ from tankcal.messages import as_plain
 from tankcal.planning.changes import IMAGES
 from tankcal.record.plain_data import to_plain
 from tankcal.report import blocks
-from tankcal.report.plain import PlainPaper
+from tankcal.report.plain import PlainPaper, words_with_part
 from tankcal.report.planning import rows
 from tankcal.text.languages import DEFAULT
 from tankcal.text.words import load_words, message_sentence
@@ -29,8 +29,7 @@ class PlanPaper(PlainPaper):
         self.prediction, self.plan = prediction, prediction.plan
         self.effects, self.design, self.simulated = effects, design, simulated
         words = load_words(language or self.plan.job.table.language or DEFAULT)
-        own = words.pop("planning")
-        super().__init__(words | {name: _merged(words.get(name, {}), own[name]) for name in own})
+        super().__init__(words_with_part(words, "planning"))
 
     def subject(self):
         """What the papers are about."""
@@ -98,10 +97,3 @@ def _place(problem):
     if "." not in problem.file:
         return ""
     return f"{problem.file}{f', {problem.column}' if problem.column else ''}: "
-
-
-def _merged(common, own):
-    """Words of a group with those of its part under `planning`; groups of groups alike."""
-    if any(isinstance(one, dict) for one in own.values()):
-        return common | {name: common.get(name, {}) | group for name, group in own.items()}
-    return common | own

@@ -39,7 +39,8 @@ class Book(Writer):
 
     subject  what the workbook is about: the tank, or the survey alone
     notice   of the certificate, on every sheet; "" for none
-    about    "capacity", "adjustment" or "plan", by which the file is called; None: by the record
+    about    "capacity", "adjustment", "plan" or "comparison", by which the file is called; None: by
+             the record
     shown    codes of the sheets that show, and are printed with the whole workbook; None: all
     """
 

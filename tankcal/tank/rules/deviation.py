@@ -128,6 +128,21 @@ def judge_deviation(limit, table, stated, printed=None):
     else:
         found = table.delivery(stated.low_m, stated.high_m)
     U = (printed or printed_of_table(table)).of(table, stated.low_m, stated.high_m, found.U_m3)
+    return judge_volume(limit, stated, found, U)
+
+
+def judge_volume(limit, stated, found, U):
+    """DeviationVerdict of a DeviationLimit and a StatedVolume for a volume.
+
+    Parameters
+    ----------
+    limit : DeviationLimit
+    stated : StatedVolume
+    found : Quantity
+        Of `tankcal.tank.capacity`: the volume that is held against it.
+    U : float
+        Its expanded uncertainty as printed, m3.
+    """
     u = found.u_m3 * U / found.U_m3 if found.U_m3 else 0.0
     room = limit.limit * abs(stated.volume_m3) if limit.limit_m3 is None else limit.limit_m3
     lower = -math.inf if limit.side == "upper" else stated.volume_m3 - room

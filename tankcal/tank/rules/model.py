@@ -15,6 +15,7 @@ DEVIATION_OF = ("volumes", "capacity", "deliveries")
 RELATIVE_TO = ("itself", "capacity")
 SIDES = ("both", "upper", "lower")
 GUARDS = ("none", "U")
+PERIOD_OF = ("all", "bottom_course")
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,45 @@ class DeviationLimit:
 
 
 @dataclass(frozen=True)
+class ReferenceHeightLimit:
+    """How far the reference height may be from the former one.
+
+    Attributes
+    ----------
+    limit_m : float
+    name, tanks, clause, verified
+        As of an UncertaintyLimit.
+    """
+
+    name: str
+    tanks: tuple[str, ...]
+    limit_m: float
+    clause: str
+    verified: bool
+
+
+@dataclass(frozen=True)
+class Period:
+    """How old a table may become.
+
+    Attributes
+    ----------
+    of : str
+        "all": the whole tank; "bottom_course": its lowest course.
+    years : float
+    name, tanks, clause, verified
+        As of an UncertaintyLimit.
+    """
+
+    name: str
+    tanks: tuple[str, ...]
+    of: str
+    years: float
+    clause: str
+    verified: bool
+
+
+@dataclass(frozen=True)
 class Rule:
     """One jurisdiction's decision rule.
 
@@ -97,6 +137,10 @@ class Rule:
         What is to stand beside it; "": nothing.
     largest_capacity_m3 : float or None
         Tanks up to which it is for; None: all.
+    uncertainty, deviation
+        Its limits of one table.
+    reference_height, periods
+        What it says of a new table beside a former one, besides the deviation.
     """
 
     name: str
@@ -106,3 +150,10 @@ class Rule:
     largest_capacity_m3: float | None
     uncertainty: tuple[UncertaintyLimit, ...]
     deviation: tuple[DeviationLimit, ...]
+    reference_height: tuple[ReferenceHeightLimit, ...] = ()
+    periods: tuple[Period, ...] = ()
+
+    @property
+    def limits(self):
+        """All of its limits."""
+        return (*self.uncertainty, *self.deviation, *self.reference_height, *self.periods)

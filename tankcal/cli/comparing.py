@@ -1,0 +1,141 @@
+"""`tankcal compare`: a former table and a new one of the same tank."""
+
+from pathlib import Path
+
+from tankcal.cli.arguments import add_language
+from tankcal.cli.machine import add_json, print_json
+from tankcal.cli.showing import (
+    Progress,
+    language_of_run,
+    marks,
+    prepare_for_small_work,
+    print_paths,
+    say,
+    speak,
+    warn,
+)
+from tankcal.messages import message
+from tankcal.text.digits import fixed
+
+MOST_WARNINGS = 10  # that are shown
+
+
+def add(commands):
+    """The parser of `tankcal compare`."""
+    compare = commands.add_parser(
+        "compare",
+        help="compare a former table with a new one of the same tank",
+        description="Bring two capacity tables of a tank to one basis (zero, temperature, head, "
+        "roof, rounding), say what differs in rows, deliveries and radii of the courses, and judge "
+        "it by a rule: keep, recompute or recalibrate. docs/compare.md says how.",
+        epilog="exit status: 0 done, whatever the verdict; 2 the input must be mended.",
+    )
+    table = "a CSV file, an Excel workbook (.xlsx), a PDF with a text table, a former.toml, a "
+    table += "record.json or a folder of results"
+    compare.add_argument("old", metavar="OLD", help=f"the former table: {table}")
+    compare.add_argument("new", metavar="NEW", help="the new table: any of these")
+    compare.add_argument(
+        "--former", metavar="FILE.toml", help="what is known of the former table beside its rows"
+    )
+    compare.add_argument(
+        "--new-former", metavar="FILE.toml", help="the same of the new table, where it is no record"
+    )
+    compare.add_argument(
+        "--courses", metavar="FILE", help="courses.csv of an upright tank (default: of the record)"
+    )
+    compare.add_argument(
+        "--rule",
+        metavar="RULE",
+        help="a rule by its name, or a .toml file (default: france_2020_recalibration)",
+    )
+    compare.add_argument(
+        "--out", metavar="DIR", help="write comparison.json and papers there, all or nothing"
+    )
+    add_language(compare)
+    compare.add_argument("--quiet", action="store_true", help="no progress, only problems")
+    add_json(compare)
+    compare.set_defaults(command=_compare)
+
+
+def _compare(options):
+    prepare_for_small_work()
+    speak(options.language)
+    from tankcal.recalibration.inputs import Asked, compare_files
+    from tankcal.record.comparison import plain_of_comparison
+
+    if options.out is not None:
+        from tankcal.report.comparison import refuse_foreign, write_comparison
+
+        refuse_foreign(options.out)
+    show = Progress(options.quiet or options.machine)
+    show.step(message("compare_reading", "comparing {old} with {new}",
+                      old=options.old, new=options.new))  # fmt: skip
+    asked = Asked(
+        options.old, options.new, former=options.former, new_former=options.new_former,
+        courses=options.courses, rule=options.rule,
+    )  # fmt: skip
+    found = plain_of_comparison(compare_files(asked))
+    written = ()
+    if options.out is not None:
+        written = write_comparison(found, options.out, language_of_run(), show.step)
+    show.end()
+    if options.machine:
+        print_json(exit_status=0, **found)
+        return
+    _tell(found)
+    if written:
+        print_paths(Path(options.out), [path.name for path in written])
+
+
+def _tell(found):
+    """Warnings, what makes up the difference, the verdict and its reasons."""
+    from tankcal.report.comparison import ComparisonPaper
+
+    paper = ComparisonPaper(found, language_of_run())
+    warn(paper.warning(one) for one in found["warnings"][:MOST_WARNINGS])
+    say(_sides(found))
+    say(_sum(found["waterfall"][-1]))
+    say(_verdict(found, paper))
+    for one in found["reasons"]:
+        say(f"  {paper.reason(one)}")
+
+
+def _sides(found):
+    return message(
+        "compare_sides",
+        "{former} against {new}: {rows} rows from {low} to {high} m",
+        former=found["former"]["name"],
+        new=found["new"]["name"],
+        rows=len(found["rows"]["height_m"]),
+        low=_plain(found["low_m"]),
+        high=_plain(found["high_m"]),
+    )
+
+
+def _sum(column):
+    names = ("former", "zero", "temperature", "head", "roof", "rounding", "tank", "new")
+    return message(
+        "compare_sum",
+        "at {dip} m, m3: former {former}, zero {zero}, temperature {temperature}, head {head}, "
+        "roof {roof}, rounding {rounding}, the tank itself {tank}, new {new}",
+        dip=_plain(column["height_m"]),
+        **{one: _signed(column[f"{one}_m3"], one not in ("former", "new")) for one in names},
+    )
+
+
+def _verdict(found, paper):
+    return message(
+        "compare_verdict",
+        "verdict: {verdict} ({rule})",
+        verdict=paper.word(f"verdicts.{found['verdict'] or 'none'}"),
+        rule=paper.found["rule"]["name"],
+    )
+
+
+def _signed(value, is_change):
+    text = fixed(value, 3, marks())
+    return f"+{text}" if is_change and value > 0 else text
+
+
+def _plain(value):
+    return f"{value:.6g}".replace(".", marks().decimal)

@@ -1,0 +1,108 @@
+"""The text of a PDF as it lies on its pages, by pypdf in a child: what ends the child, we survive.
+
+Libraries that read PDFs can be led to hang or to ask for all the memory there is.
+"""
+
+import contextlib
+import json
+import subprocess
+import sys
+from importlib.util import find_spec
+
+from tankcal.messages import message
+
+MOST_PAGES, MOST_TEXT = 300, 20_000_000
+MOST_SECONDS = 300
+MEMORY_LIMIT = 2 << 30  # bytes of address space
+PAGES, ENCRYPTED, MANY_PAGES, LONG_TEXT, DAMAGED = "pages", "encrypted", "many", "long", "damaged"
+_CODE = (
+    "import json, sys; request = json.loads(sys.argv[1]); sys.path[:] = request['sys_path']; "
+    "from tankcal.linter.pdf_text import main; main(request)"
+)
+
+
+def pages_of(path, log):
+    """Tuple of the text of each page, laid out; None after telling `log` why there is none."""
+    if find_spec("pypdf") is None:
+        expected = message(
+            "lint_no_pypdf",
+            "reading a PDF takes pypdf, which is not installed; expected pip install "
+            "'tankcal[pdf]', or the table as CSV or workbook",
+        )
+        log.problem(path.name, expected)
+        return None
+    kind, said = _asked_child(path)
+    if kind == PAGES and any(page.strip() for page in said):
+        return tuple(said)
+    log.problem(path.name, _refusal(kind, said))
+    return None
+
+
+def _refusal(kind, said):
+    if kind == PAGES:
+        return message(
+            "lint_scanned_pdf",
+            "no text in it: is it a scan? expected a PDF whose text can be selected, or the table "
+            "typed as CSV or workbook",
+        )
+    if kind == ENCRYPTED:
+        return message("lint_encrypted_pdf", "a PDF with a password; expected one without")
+    if kind == MANY_PAGES:
+        return message(
+            "lint_long_pdf",
+            "{count} pages; expected at most {most}: only those of the table",
+            count=said,
+            most=MOST_PAGES,
+        )
+    if kind == LONG_TEXT:
+        return message("lint_much_text", "more text than a table can have; expected a table")
+    return message("lint_damaged_pdf", "not a PDF that can be read, or damaged")
+
+
+def _asked_child(path):
+    """(kind, pages or whatever is said of them) that a child answers."""
+    request = {"path": str(path.resolve()), "sys_path": sys.path}
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _CODE, json.dumps(request)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            timeout=MOST_SECONDS,
+            check=False,
+        )
+        kind, said = json.loads(done.stdout)
+    except (subprocess.TimeoutExpired, OSError, ValueError):
+        return DAMAGED, None
+    return kind, said
+
+
+def main(request):
+    """Print [kind, what is said] of the PDF of a request as JSON."""
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_LIMIT, MEMORY_LIMIT))
+        resource.setrlimit(resource.RLIMIT_CPU, (MOST_SECONDS, MOST_SECONDS))
+    try:
+        answer = _answer(request["path"])
+    except Exception as error:
+        answer = [DAMAGED, type(error).__name__]
+    sys.stdout.write(json.dumps(answer))
+
+
+def _answer(path):
+    import pypdf
+
+    reader = pypdf.PdfReader(path)
+    if reader.is_encrypted and not reader.decrypt(""):
+        return [ENCRYPTED, None]
+    if len(reader.pages) > MOST_PAGES:
+        return [MANY_PAGES, len(reader.pages)]
+    pages, size = [], 0
+    for page in reader.pages:
+        pages.append(page.extract_text(extraction_mode="layout"))
+        size += len(pages[-1])
+        if size > MOST_TEXT:
+            return [LONG_TEXT, None]
+    return [PAGES, pages]

@@ -1,0 +1,255 @@
+"""The rows of a table in SI units, with what its last digits are worth: for other rooms to use."""
+
+from dataclasses import dataclass
+from math import gcd, isfinite
+
+import numpy as np
+
+from tankcal.job.tables import nearest
+from tankcal.linter.linting import checked
+from tankcal.linter.totals import NO_UNITS, NOTHING_NOMINAL, likely_units
+from tankcal.messages import message
+
+_SAME_TOP = 1e-3  # of height and volume: tables of one tank in two sheets
+_MOST_DIGITS = 6  # written after the mark: more are no rounding
+_FEWEST_FOR_ROUNDING = 8  # rows
+
+
+@dataclass(frozen=True)
+class TableRows:
+    """The rows of a capacity table as printed, in SI units, volumes rising.
+
+    Attributes
+    ----------
+    name : str
+        Of the file, or file and sheet.
+    row : (rows,) ndarray of int
+        Where each stands in the file.
+    height_m : (rows,) ndarray
+        Strictly rising; of ullages minus the ullage.
+    volume_m3 : (rows,) ndarray
+    height_rounding_m : (rows,) ndarray
+        Largest rounding error of each height; 0 where the steps are even.
+    height_quantum_m : float
+        Twice the usual one of them.
+    volume_quantum_m3 : float
+        Last digit, or 2, 5, 10 ... of it where all volumes are whole multiples of that; 0 where
+        they were not rounded.
+    is_ullage : bool
+    U_m3, u_m3 : (rows,) ndarray or None
+        Expanded or standard uncertainties, whichever stands beside the volumes.
+    k : float or None
+        Coverage factor that the table names: of rows that have different ones the median.
+    height_unit_m, volume_unit_m3 : float
+    joints_m : tuple of float
+        Heights at which the area of the cut jumps, or its derivative.
+    """
+
+    name: str
+    row: np.ndarray
+    height_m: np.ndarray
+    volume_m3: np.ndarray
+    height_rounding_m: np.ndarray
+    height_quantum_m: float
+    volume_quantum_m3: float
+    is_ullage: bool
+    U_m3: np.ndarray | None
+    u_m3: np.ndarray | None
+    k: float | None
+    height_unit_m: float
+    volume_unit_m3: float
+    joints_m: tuple[float, ...]
+
+
+def read_rows(path, log, sheet=None, declared=NO_UNITS, volume_column=None):
+    """(`TableRows` or None, `Report`) of the capacity table in a file.
+
+    Parameters
+    ----------
+    path : path
+        As of `lint`.
+    log : Log
+        Gets what keeps the rows from being used although the linter finds no error: units or
+        columns that are not clear, uncertainties that cannot be read.
+    sheet : str, optional
+        None: that of the longest table, or of one of the same tank that has uncertainties.
+    declared : Units
+        Sizes of units of columns whose headings name none.
+    volume_column : str, optional
+        Heading of the column to read, where there are several.
+
+    Returns
+    -------
+    (TableRows or None, Report)
+        None where the report has errors, or after telling `log`.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read or holds no table.
+    """
+    choose = None if sheet is not None else _sheet_with_uncertainties
+    found = checked(path, NOTHING_NOMINAL, sheet, declared, choose)
+    tables = [one for one in found.tables if one.volumes is not None]
+    if found.report.errors or not tables:
+        return None, found.report
+    told = len(log.problems)
+    one = _the_table(tables, volume_column, log)
+    if one is None or not _has_clear_units(one, log):
+        return None, found.report
+    rows = _rows(one, log)
+    return (rows if len(log.problems) == told else None), found.report
+
+
+def _sheet_with_uncertainties(sheets):
+    """Number of the sheet of the longest table, or of one of the same tank that says more."""
+    longest = [max(tables, key=lambda one: len(one.entries), default=None) for tables in sheets]
+    sizes = [0 if one is None else len(one.entries) for one in longest]
+    best = sizes.index(max(sizes))
+    top = _top(longest[best])
+    for number, table in enumerate(longest):
+        if table is None or table.uncertainty is None or top is None:
+            continue
+        other = _top(table)
+        if other and all(abs(a - b) <= _SAME_TOP * abs(a) for a, b in zip(top, other, strict=True)):
+            return number
+    return best
+
+
+def _top(table):
+    """(height, volume) of the last row of a table, in SI as far as units are named; or None."""
+    last = table.entries[-1]
+    if last.height.value is None or last.volume.value is None:
+        return None
+    height_unit, volume_unit = table.height_unit_m or 1.0, table.volume_unit_m3 or 1.0
+    return last.height.value * height_unit, last.volume.value * volume_unit
+
+
+def _the_table(tables, volume_column, log):
+    """The one to read; None after telling `log` that there is none, or more than one."""
+    names = [str(one.table.entries[0].volume_column) for one in tables]
+    if volume_column is not None:
+        named = [
+            one
+            for one, name in zip(tables, names, strict=True)
+            if name.strip().casefold() == volume_column.strip().casefold()
+        ]
+        if len(named) == 1:
+            return named[0]
+        expected = message(
+            "former_no_column",
+            "no column of volumes {column!r}{hint}; the table has {names}",
+            column=volume_column,
+            hint=nearest(volume_column, names),
+            names=names,
+        )
+        log.problem(tables[0].table.name, expected)
+        return None
+    best = max(tables, key=lambda one: len(one.volumes.volume))
+    for other in tables:
+        if other is not best and not _agree(best, other):
+            expected = message(
+                "former_many_columns",
+                "several columns of volumes that differ ({names}); name one: volume_column in "
+                "former.toml",
+                names=names,
+            )
+            log.problem(best.table.name, expected)
+            return None
+    return best
+
+
+def _agree(one, other):
+    """Whether two tables say the same, as one in m3 beside one in litres does."""
+    h, v = _in_si(one)
+    h2, v2 = _in_si(other)
+    between = np.interp(h2, h, v)
+    return bool(np.all(abs(between - v2) <= _SAME_TOP * max(v[-1], v2[-1])))
+
+
+def _in_si(one):
+    return one.volumes.height * one.units.height_m, one.volumes.volume * one.units.volume_m3
+
+
+def _has_clear_units(one, log):
+    """Whether headings name the units, or only one pair of units makes a tank of this table."""
+    if None not in (one.table.height_unit_m, one.table.volume_unit_m3):
+        return True
+    likely = likely_units(one.table, one.volumes)
+    if len(likely) == 1:
+        return True
+    expected = message(
+        "former_no_units",
+        "the headings name no units, and {count} would make a tank of this table; expected "
+        "height_unit and volume_unit in former.toml",
+        count=len(likely),
+    )
+    log.problem(one.table.name, expected)
+    return False
+
+
+def _rows(one, log):
+    table, series, units = one.table, one.series, one.units
+    place = {float(height): k for k, height in enumerate(series.height)}
+    at = [place[float(height)] for height in one.volumes.height]
+    entries = [series.entries[k] for k in at]
+    rounding = series.rounding[at] * units.height_m
+    volume = one.volumes.volume
+    U, is_expanded, k = _uncertainties(table, entries, units, log)
+    return TableRows(
+        name=table.name,
+        row=np.array([entry.row for entry in entries]),
+        height_m=one.volumes.height * units.height_m,
+        volume_m3=volume * units.volume_m3,
+        height_rounding_m=rounding,
+        height_quantum_m=2 * float(np.median(rounding)),
+        volume_quantum_m3=_quantum(volume, one.volumes.decimals) * units.volume_m3,
+        is_ullage=series.direction < 0,
+        U_m3=U if is_expanded else None,
+        u_m3=None if is_expanded else U,
+        k=k,
+        height_unit_m=units.height_m,
+        volume_unit_m3=units.volume_m3,
+        joints_m=tuple(joint * units.height_m for joint in one.volumes.joints),
+    )
+
+
+def _quantum(volume, decimals):
+    """1, 2 or 5 of a decimal place that all volumes are whole multiples of; 0: not rounded."""
+    if decimals > _MOST_DIGITS:
+        return 0.0
+    digits = np.rint(volume * 10.0**decimals)
+    common = gcd(*(int(digit) for digit in digits)) if len(digits) >= _FEWEST_FOR_ROUNDING else 1
+    fits = [one * 10**power for power in range(6) for one in (1, 2, 5)]
+    coarsest = max(one for one in fits if common % one == 0)
+    return coarsest * 10.0**-decimals
+
+
+def _uncertainties(table, entries, units, log):
+    """((rows,) in m3 or None, whether expanded, k or None) that stand beside the volumes."""
+    said = table.uncertainty
+    if said is None:
+        return None, True, None
+    values = []
+    for entry in entries:
+        reading = entry.uncertainty
+        if reading is not None and reading.value is not None and reading.value >= 0:
+            values.append(reading.value)
+            continue
+        values.append(np.nan)
+        found = reading.complaint if reading is not None and reading.value is None else None
+        expected = found or message(
+            "former_negative_U",
+            "found {found}; expected an uncertainty of 0 or more",
+            found=reading.text if reading else "",
+        )
+        column = message("former_column_of_U", "uncertainties")
+        log.problem(table.name, expected, entry.row, column)
+    size = units.volume_m3 if said.unit is None else said.unit
+    volume_m3 = np.array([entry.volume.value for entry in entries]) * units.volume_m3
+    scale = volume_m3 / 100 if said.in_percent else size
+    factors = [e.k.value for e in entries if e.k is not None and e.k.value is not None]
+    k = said.k if said.k is not None else (float(np.median(factors)) if factors else None)
+    if k is not None and not (isfinite(k) and 0 < k <= 100):
+        k = None
+    return np.array(values) * scale, said.is_expanded, k

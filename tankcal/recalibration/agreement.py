@@ -1,0 +1,224 @@
+"""Do two tables agree: the normalised error of rows and deliveries, with their correlation.
+
+    E_n = d / sqrt(U_new^2 + U_old^2 - 2 c U_new U_old)
+
+c is the correlation of the errors of both tables. |E_n| = 1 at
+c = (U_new^2 + U_old^2 - d^2) / (2 U_new U_old).
+Source: ISO/IEC 17043:2010, B.3 (E_n, c = 0); with correlation JCGM 100:2008, 5.2.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtri
+
+PROPORTIONAL = 0.01  # spread of U over V: a U in percent
+SAME_M = 1e-9
+
+
+def normalized_error(d, U_new, U_former, c=0.0):
+    """E_n of differences; nan where a U is not known, inf where no difference is allowed for.
+
+    Parameters
+    ----------
+    d, U_new, U_former : array_like
+        Difference and expanded uncertainties for the same coverage, in one unit.
+    c : float
+        Correlation of the errors.
+
+    Examples
+    --------
+    >>> [round(float(normalized_error(0.70, 0.46, 0.60, c)), 2) for c in (0, 0.5)]
+    [0.93, 1.29]
+    """
+    d, one, two = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (d, U_new, U_former)))
+    variance = one**2 + two**2 - 2 * c * one * two
+    least = 1e-12 * (one**2 + two**2)
+    U = np.sqrt(np.where(variance > least, variance, 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = np.where(d == 0, 0.0, d / U)
+    return np.where(np.isnan(one) | np.isnan(two), np.nan, found)
+
+
+def critical_correlation(d, U_new, U_former):
+    """The correlation at which |E_n| is 1; nan where it is below 1 for every one, or a U unknown.
+
+    -1 where it is above 1 for every one; without a difference there is none.
+    """
+    d, one, two = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (d, U_new, U_former)))
+    product = 2 * one * two
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = (one**2 + two**2 - d**2) / product
+    found = np.where(found > 1, np.nan, np.maximum(found, -1.0))
+    return np.where((product > 0) & (d != 0), found, np.nan)
+
+
+@dataclass(frozen=True)
+class TableUncertainty:
+    """Expanded uncertainties of a table at some dips, all for one coverage.
+
+    Attributes
+    ----------
+    k : float
+        Factor that they are for.
+    volume_m3 : (rows,) ndarray
+        At the dips.
+    U_m3 : (rows,) ndarray or None
+        Of them, rounding included; None: not known.
+    rounding_m3 : float
+        The part of U that the last digit adds.
+    factor_m3 : (rows, inputs) ndarray or None
+        Of a record, scaled so that U of a difference is the length of that of its rows.
+    deliveries_by : {"record", "proportional", "independent_rows"} or None
+        How U of a delivery is made.
+    """
+
+    k: float
+    volume_m3: np.ndarray
+    U_m3: np.ndarray | None
+    rounding_m3: float
+    factor_m3: np.ndarray | None
+    deliveries_by: str | None
+
+    def rows(self):
+        """(rows,) U; nan: not known."""
+        return np.full(len(self.volume_m3), np.nan) if self.U_m3 is None else self.U_m3
+
+    def deliveries(self, low, high):
+        """(n,) U of deliveries between rows, by their indices; nan: not known."""
+        if self.deliveries_by is None:
+            return np.full(len(low), np.nan)
+        if self.deliveries_by == "record":
+            apart = self.factor_m3[high] - self.factor_m3[low]
+            U = np.sqrt(np.einsum("ij,ij->i", apart, apart))
+        elif self.deliveries_by == "proportional":
+            part = self.U_m3[-1] / self.volume_m3[-1]
+            U = part * np.abs(self.volume_m3[high] - self.volume_m3[low])
+        else:
+            return np.hypot(self.U_m3[low], self.U_m3[high])
+        return np.hypot(U, np.sqrt(2) * self.rounding_m3)
+
+
+def coverage_factor_of(table):
+    """The factor of a normal distribution for the coverage that a table's U is for."""
+    if table.record is None:
+        return table.k
+    probability = table.record["job"]["table"].get("coverage_probability") or 0.95
+    return float(ndtri(0.5 + probability / 2))
+
+
+def uncertainty_at(table, dips_m, volume_m3, k, error_m3=0.0):
+    """TableUncertainty of a FormerTable at dips.
+
+    Parameters
+    ----------
+    table : FormerTable
+    dips_m : (rows,) ndarray
+        In its own range.
+    volume_m3 : (rows,) ndarray
+        That it is stated for.
+    k : float
+        Factor of a normal distribution for the coverage that is asked for.
+    error_m3 : float
+        Largest error of what was interpolated, which is added as evenly spread.
+    """
+    spread = np.hypot(table.volume_quantum_m3 / np.sqrt(12), error_m3 / np.sqrt(3))
+    rounding = float(k * spread)
+    if table.U_m3 is None:
+        return TableUncertainty(k, volume_m3, None, rounding, None, None)
+    scale = k / coverage_factor_of(table)
+    stated = scale * np.interp(dips_m, table.height_m, table.U_m3)
+    factor, by = None, "independent_rows"
+    if table.factor_m3 is not None:
+        factor, by = _factor_at(table, dips_m, stated), "record"
+    elif _is_in_percent(table):
+        by = "proportional"
+    return TableUncertainty(k, volume_m3, np.hypot(stated, rounding), rounding, factor, by)
+
+
+def _factor_at(table, dips, stated):
+    """(rows, inputs) factor at dips, each row as long as the U that is stated there."""
+    upper = np.clip(np.searchsorted(table.height_m, dips), 1, len(table.height_m) - 1)
+    below = table.height_m[upper - 1]
+    part = ((dips - below) / (table.height_m[upper] - below))[:, None]
+    factor = (1 - part) * table.factor_m3[upper - 1] + part * table.factor_m3[upper]
+    length = np.sqrt(np.einsum("ij,ij->i", factor, factor))
+    usual = np.median(stated[length > 0] / length[length > 0]) if (length > 0).any() else 1.0
+    return usual * factor
+
+
+def _is_in_percent(table):
+    above = table.volume_m3 > 0.05 * table.volume_m3[-1]
+    part = table.U_m3[above] / table.volume_m3[above]
+    return bool(len(part) and np.ptp(part) <= PROPORTIONAL * part.max())
+
+
+@dataclass(frozen=True)
+class Deliveries:
+    """Differences of deliveries between rows, each field (n,)."""
+
+    low: np.ndarray
+    high: np.ndarray
+    d_m3: np.ndarray
+    former_m3: np.ndarray
+    U_new_m3: np.ndarray
+    U_former_m3: np.ndarray
+    E_n: np.ndarray
+    c_limit: np.ndarray
+
+
+def deliveries_between(basis, former_U, new_U, c, low, high):
+    """The `Deliveries` between rows of a OneBasis, by their indices."""
+    low, high = np.atleast_1d(low), np.atleast_1d(high)
+    new = basis.new_m3[high] - basis.new_m3[low]
+    former = basis.on_basis_m3[high] - basis.on_basis_m3[low]
+    U_new, U_former = new_U.deliveries(low, high), former_U.deliveries(low, high)
+    d = new - former
+    return Deliveries(
+        low, high, d, former, U_new, U_former,
+        normalized_error(d, U_new, U_former, c), critical_correlation(d, U_new, U_former),
+    )  # fmt: skip
+
+
+def worst_by_share(basis, minimum_m):
+    """(low, high) rows of the delivery of at least `minimum_m` with the largest |d| / V, or None.
+
+    A delivery of twice the minimum and more is made up of two, one of which is not better: so only
+    lower ones are looked at. No delivery spans a zone that is not for use at one of its ends.
+    """
+    dips, use = basis.height_m, np.flatnonzero(basis.for_use)
+    dips, d = dips[use], (basis.new_m3 - basis.on_basis_m3)[use]
+    volume = basis.on_basis_m3[use]
+    if len(use) < 2:
+        return None
+    step = float(np.diff(dips).max())
+    first = np.searchsorted(dips, dips + minimum_m - SAME_M)
+    last = np.searchsorted(dips, dips + 2 * minimum_m + step + SAME_M)
+    best, pair = -1.0, None
+    for i in np.flatnonzero(first < len(dips)):
+        j = slice(first[i], max(last[i], first[i] + 1))
+        delivered = volume[j] - volume[i]
+        share = np.abs(d[j] - d[i]) / np.where(delivered > 0, delivered, np.inf)
+        place = int(np.argmax(share))
+        if share[place] > best:
+            best, pair = float(share[place]), (int(use[i]), int(use[first[i] + place]))
+    return pair
+
+
+def worst_by_error(basis, former_U, new_U, c, minimum_m, also=()):
+    """The one-row Deliveries of the largest |E_n| among those of the minimum height, or None.
+
+    also  further pairs of rows; None where a U is not known, or no delivery is so high
+    """
+    use = np.flatnonzero(basis.for_use)
+    dips = basis.height_m[use]
+    first = np.searchsorted(dips, dips + minimum_m - SAME_M)
+    there = np.flatnonzero(first < len(dips))
+    low, high = use[there], use[first[there]]
+    for pair in also:
+        low, high = np.append(low, pair[0]), np.append(high, pair[1])
+    if not len(low) or former_U.deliveries_by is None or new_U.deliveries_by is None:
+        return None
+    found = deliveries_between(basis, former_U, new_U, c, low.astype(int), high.astype(int))
+    place = int(np.argmax(np.abs(found.E_n)))
+    return deliveries_between(basis, former_U, new_U, c, found.low[place], found.high[place])

@@ -1,0 +1,397 @@
+"""A former table on the basis of a new one: zero, temperature, head, roof, rounding, in this order.
+
+Each step starts from what those before it gave, so that together with what is left they add up to
+the difference of the tables:
+
+    zero         V(h + h0), h0 the height of the new zero above the former one
+    temperature  areas carry (1 + a (T_new - T_old))^2; of a tank that is one solid, and where dips
+                 expand too, V s^3 at the dip h / s, s = 1 + a (T_new - T_old)
+    head         of the new density less that of the former, in the rings of the former table
+    roof         what it displaces, of the former table less of the new one
+    rounding     to the last digit of the new table
+
+A step whose values are not known is not made, and its state says what is lacking.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+from tankcal.recalibration.densities import Density, densities_of
+from tankcal.recalibration.difference import adjust_difference, slopes_m2
+from tankcal.recalibration.upright_shell import Rings
+from tankcal.record.comparison import BasisStep, ZeroShift
+from tankcal.tank.fittings import floating_roof
+
+ROUNDS = 5  # of the zero: each leaves a hundredth of the last, or less
+SAME_ZERO_M = 1e-7
+FEWEST_ROWS = 2
+SPARE = 1.1  # of a smooth curve: it bends a little more between rows than at them
+NOTICED, LEAST_ZERO_M = 2.0, 1e-4  # standard uncertainties, and size: a zero below either is none
+UNITS = {"zero": "m", "temperature": "C", "head": "kg/m3", "roof": "m3", "rounding": "m3"}
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step.
+
+    Attributes
+    ----------
+    added_m3 : (rows,) ndarray
+    state, source, former, new, lacking
+        As of `record.comparison.BasisStep`.
+    """
+
+    added_m3: np.ndarray
+    state: str
+    source: str | None = None
+    former: float | None = None
+    new: float | None = None
+    lacking: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class OneBasis:
+    """Rows of a new table, and what the former one says of them on its basis.
+
+    Attributes
+    ----------
+    height_m : (rows,) ndarray
+        Dips of the new table in the range of both.
+    rows : (rows,) ndarray of int
+        Which rows of the new table they are.
+    former_m3, on_basis_m3, new_m3 : (rows,) ndarray
+        The former table as printed; on the basis of the new one; the new one.
+    steps : dict
+        {name: Step}, in their order.
+    zero : ZeroShift
+    for_use : (rows,) ndarray of bool
+        False where a roof is partly afloat.
+    interpolation_m3 : float
+        Largest error of what was interpolated in the former table.
+    densities : (Density, Density)
+        Of the former and the new table.
+    """
+
+    height_m: np.ndarray
+    rows: np.ndarray
+    former_m3: np.ndarray
+    on_basis_m3: np.ndarray
+    new_m3: np.ndarray
+    steps: dict
+    zero: ZeroShift
+    for_use: np.ndarray
+    interpolation_m3: float
+    densities: tuple[Density, Density]
+
+    @property
+    def saved_steps(self):
+        """The `BasisStep` of each."""
+        return [_saved(name, one, self.height_m) for name, one in self.steps.items()]
+
+
+def bring_to_one_basis(former, new, facts):
+    """`OneBasis` of two FormerTables of a tank.
+
+    Parameters
+    ----------
+    former, new : FormerTable
+    facts : TankFacts
+
+    Returns
+    -------
+    OneBasis
+
+    Raises
+    ------
+    InputError
+        When the tables have no two rows in common.
+    """
+    zero = _declared_zero(former, new)
+    densities = densities_of(former, new, facts)
+    fitted = _fitted_zero(former, new, facts, densities)
+    if zero is None and fitted is not None:
+        least = max(NOTICED * fitted[1], LEAST_ZERO_M)
+        zero = fitted[0] if abs(fitted[0]) > least else None
+    rows = rows_in_both(former, new, zero or 0.0)
+    steps, former_m3, basis = _steps(former, new, facts, densities, zero or 0.0, rows)
+    shift = _zero_shift(former, new, zero, fitted, rows)
+    steps["zero"] = _zero_step(steps["zero"], shift, former, new)
+    return OneBasis(
+        height_m=new.height_m[rows],
+        rows=rows,
+        former_m3=former_m3,
+        on_basis_m3=basis,
+        new_m3=new.volume_m3[rows],
+        steps=steps,
+        zero=shift,
+        for_use=_for_use(former, new, zero or 0.0, new.height_m[rows]),
+        interpolation_m3=interpolation_error_m3(former, new.height_m[rows] + (zero or 0.0)),
+        densities=densities,
+    )
+
+
+def rows_in_both(former, new, zero_m):
+    """Indices of the rows of the new table that the former one has, with and without a zero.
+
+    Raises InputError where there are not two of them.
+    """
+    low, high = former.height_m[0] - 1e-9, former.height_m[-1] + 1e-9
+    dips = new.height_m
+    inside = (dips >= low) & (dips <= high) & (dips + zero_m >= low) & (dips + zero_m <= high)
+    found = np.flatnonzero(inside)
+    if len(found) < FEWEST_ROWS:
+        expected = message(
+            "compare_no_common_range",
+            "dips from {low:g} to {high:g} m; expected some in the range of {other}, {from_m:g} to "
+            "{to_m:g} m",
+            low=float(dips[0]),
+            high=float(dips[-1]),
+            other=former.name,
+            from_m=float(former.height_m[0]),
+            to_m=float(former.height_m[-1]),
+        )
+        raise InputError(Problem(new.name, expected))
+    return found
+
+
+def volume_at(table, dips_m):
+    """(n,) volumes of a table, linear between its rows as a gauge reads them."""
+    return np.interp(dips_m, table.height_m, table.volume_m3)
+
+
+def interpolation_error_m3(table, dips_m):
+    """A bound of the error of `volume_at`, by how far rows leave the chord of their neighbours.
+
+    Rows that stand in the table have none; what one digit explains is none. Of a smooth curve a row
+    leaves the chord by V'' s^2 / 2, the middle between rows by a fourth of that. A kink between two
+    rows makes them leave their chords by p and q, and the error at it is 2 p q / (p + q).
+    """
+    heights, volumes = table.height_m, table.volume_m3
+    if len(heights) < 3:
+        return 0.0
+    part = np.diff(heights)[:-1] / (heights[2:] - heights[:-2])
+    chord = volumes[:-2] + part * (volumes[2:] - volumes[:-2])
+    off = np.maximum(np.abs(volumes[1:-1] - chord) - table.volume_quantum_m3, 0.0)
+    off = np.pad(off, 2, mode="edge")  # of rows from the one below the first to that above the last
+    four = np.array([off[k : len(off) - 3 + k] for k in range(4)])
+    smooth = four.min(axis=0)
+    one, two = four[1] - smooth, four[2] - smooth
+    kink = 2 * one * two / np.maximum(one + two, 1e-300)
+    bound = smooth / 4 * SPARE + kink
+    upper = np.clip(np.searchsorted(heights, dips_m - 1e-9), 1, len(heights) - 1)
+    nearest = np.minimum(np.abs(heights[upper] - dips_m), np.abs(heights[upper - 1] - dips_m))
+    return float(bound[upper - 1][nearest > 1e-7].max(initial=0.0))
+
+
+# ---- the zero
+
+
+def _declared_zero(former, new):
+    if former.reference_height_m is None or new.reference_height_m is None:
+        return None
+    return former.reference_height_m - new.reference_height_m
+
+
+def _fitted_zero(former, new, facts, densities):
+    """(height of the new zero above the former one, its u) by the volumes; None: they are mum."""
+    zero, found = 0.0, None
+    quanta = np.hypot(former.volume_quantum_m3, new.volume_quantum_m3) / np.sqrt(12)
+    for _ in range(ROUNDS):
+        try:
+            rows = rows_in_both(former, new, zero)
+        except InputError:
+            return None
+        _, _, basis = _steps(former, new, facts, densities, zero, rows, until="roof")
+        dips, volumes = new.height_m[rows], new.volume_m3[rows]
+        usable = _for_use(former, new, zero, dips)
+        found = adjust_difference(facts, dips, volumes - basis, volumes, quanta, usable)
+        if found is None:
+            return None
+        zero += found.zero_m
+        if abs(found.zero_m) < SAME_ZERO_M:
+            break
+    return (zero, found.u_zero_m) if abs(zero) < former.height_m[-1] else None
+
+
+def _zero_shift(former, new, zero, fitted, rows):
+    is_declared = _declared_zero(former, new) is not None
+    area = slopes_m2(new.height_m, new.volume_m3)[rows]
+    source = "reference_heights" if is_declared else "none" if zero is None else "fitted"
+    return ZeroShift(
+        height_m=zero or 0.0,
+        u_m=fitted[1] if source == "fitted" else None,
+        source=source,
+        fitted_m=fitted and fitted[0],
+        fitted_u_m=fitted and fitted[1],
+        volume_m3=fitted and float(fitted[0] * np.median(area)),
+    )
+
+
+def _zero_step(step, shift, former, new):
+    if shift.source == "reference_heights":
+        state = "done" if shift.height_m else "same"
+        source = "declared" if shift.height_m else None
+        heights = former.reference_height_m, new.reference_height_m
+        return replace(step, state=state, source=source, former=heights[0], new=heights[1])
+    if shift.source == "fitted":
+        return replace(step, state="done", source="fitted")
+    if shift.fitted_m is not None:
+        return replace(step, state="same")
+    return replace(step, state="not_declared", lacking=_lacking(
+        ("former.reference_height_m", former.reference_height_m),
+        ("new.reference_height_m", new.reference_height_m),
+    ))  # fmt: skip
+
+
+# ---- the steps
+
+
+def _steps(former, new, facts, densities, zero, rows, until="rounding"):
+    """({name: Step}, former volumes as printed, on the new basis) in rows of the new table."""
+    dips = new.height_m[rows]
+    before = volume_at(former, dips)
+    basis = volume_at(former, dips + zero)
+    steps = {"zero": Step(basis - before, "done")}
+    for name, make in (
+        ("temperature", _temperature),
+        ("head", _head),
+        ("roof", _roof),
+        ("rounding", _rounding),
+    ):
+        steps[name] = make(former, new, facts, densities, zero, dips, basis)
+        basis = basis + steps[name].added_m3
+        if name == until:
+            break
+    return steps, before, basis
+
+
+def _none(dips, state, **more):
+    return Step(np.zeros(len(dips)), state, **more)
+
+
+def _lacking(*pairs):
+    return tuple(name for name, value in pairs if value is None)
+
+
+def _temperature(former, new, facts, densities, zero, dips, basis):
+    was, is_now = former.reference_temperature_c, new.reference_temperature_c
+    values = {"former": was, "new": is_now}
+    lacking = _lacking(
+        ("former.reference_temperature_c", was), ("new.reference_temperature_c", is_now)
+    )
+    if lacking:
+        return _none(dips, "not_declared", lacking=lacking, **values)
+    if was == is_now:
+        return _none(dips, "same", **values)
+    if facts.kind is None:
+        return _none(dips, "not_declared", lacking=("kind",), **values)
+    scale = 1 + facts.expansion_per_k * (is_now - was)
+    if facts.kind == "vertical" and not facts.dips_expand:
+        added = basis * (scale**2 - 1)
+    else:
+        area = slopes_m2(dips, basis) if len(dips) > 2 else 0.0
+        added = basis * (scale**3 - 1) + scale**3 * area * dips * (1 / scale - 1)
+    return Step(added, "done", "declared", **values)
+
+
+def _head(former, new, facts, densities, zero, dips, basis):
+    was, is_now = densities
+    values = {"former": was.kg_m3, "new": is_now.kg_m3}
+    lacking = _lacking(
+        ("former.liquid_density_kg_m3", was.kg_m3), ("new.liquid_density_kg_m3", is_now.kg_m3)
+    )
+    if lacking:
+        return _none(dips, "not_declared", lacking=lacking, **values)
+    if was.kg_m3 == is_now.kg_m3:
+        return _none(dips, "same", **values)
+    if not facts.has_plates:
+        lacking = ("courses.thickness_mm",) if facts.is_shell else ("courses",)
+        return _none(dips, "not_possible", lacking=lacking, **values)
+    rings = Rings(facts.edges_m(), facts.thickness_m, facts.modulus_pa, is_first_order=False)
+    radii = radii_of_rows(rings, dips, basis, was.kg_m3)
+    added = rings.volume_m3(dips, radii, is_now.kg_m3) - rings.volume_m3(dips, radii, was.kg_m3)
+    source = "read" if "read" in (was.source, is_now.source) else "declared"
+    return Step(added, "done", source, **values)
+
+
+def radii_of_rows(rings, dips, volumes, density):
+    """(courses,) unloaded radii of the rings by what volumes rise within them.
+
+    A ring that no two rows reach gets that of the next one below.
+    """
+    radii, edges = np.empty(len(rings.thickness_m)), rings.edges_m.copy()
+    edges[-1] = max(edges[-1], dips[-1])
+    head = np.zeros(len(dips))
+    for _ in range(2):  # once without, once with the head that these radii have
+        for k in range(len(radii)):
+            inside = np.flatnonzero((dips >= edges[k] - 1e-9) & (dips <= edges[k + 1] + 1e-9))
+            inside = inside[len(inside) // 2 :] if k == 0 and len(inside) > 5 else inside
+            radii[k] = radii[k - 1] if k else np.sqrt(volumes[-1] / np.pi / dips[-1])
+            if len(inside) > 1:
+                one, two = inside[0], inside[-1]
+                rise = volumes[two] - head[two] - volumes[one] + head[one]
+                radii[k] = np.sqrt(max(rise, 1e-9) / np.pi / (dips[two] - dips[one]))
+        head = rings.volume_m3(dips, radii, density) - rings.volume_m3(dips, radii, 0.0)
+    return radii
+
+
+def _roof(former, new, facts, densities, zero, dips, basis):
+    was, is_now = former.roof, new.roof
+    if was is None and is_now is None:
+        return _none(dips, "same")
+    lacking = _lacking(("former.roof", was), ("new.roof", is_now))
+    if lacking:
+        return _none(dips, "not_declared", lacking=lacking)
+    displaced = [_displaced_m3(one) for one in (was, is_now)]
+    values = {"former": displaced[0], "new": displaced[1]}
+    zone = is_now.critical_m or (was.critical_m and tuple(x - zero for x in was.critical_m))
+    if displaced[0] == displaced[1]:
+        return _none(dips, "same", **values)
+    if zone is None:
+        return _none(dips, "not_declared", lacking=("new.roof.critical_m",), **values)
+    afloat = np.clip((dips - zone[0]) / max(zone[1] - zone[0], 1e-9), 0.0, 1.0)
+    return Step((displaced[0] - displaced[1]) * afloat, "done", "declared", **values)
+
+
+def _displaced_m3(roof):
+    part = floating_roof(roof.mass_kg, 0.0, 1.0, roof.density_kg_m3, roof.weighing)
+    return float(part.displacement_m3())
+
+
+def _rounding(former, new, facts, densities, zero, dips, basis):
+    digit = new.volume_quantum_m3
+    values = {"former": former.volume_quantum_m3, "new": digit}
+    if digit == 0:
+        return _none(dips, "same", **values)
+    added = np.round(basis / digit) * digit - basis
+    added[np.abs(added) < 1e-9 * digit] = 0.0
+    state = "done" if added.any() else "same"
+    return Step(added, state, "declared" if state == "done" else None, **values)
+
+
+def _for_use(former, new, zero, dips):
+    found = np.full(len(dips), True)
+    for table, shift in ((former, zero), (new, 0.0)):
+        if table.roof is not None and table.roof.critical_m is not None:
+            low, high = table.roof.critical_m
+            found &= (dips + shift <= low + 1e-9) | (dips + shift >= high - 1e-9)
+    return found
+
+
+def _saved(name, step, dips):
+    most = int(np.argmax(np.abs(step.added_m3)))
+    return BasisStep(
+        code=name,
+        state=step.state,
+        source=step.source,
+        former=step.former,
+        new=step.new,
+        unit=UNITS[name],
+        lacking=list(step.lacking),
+        top_m3=float(step.added_m3[-1]),
+        largest_m3=float(step.added_m3[most]),
+        largest_at_m=float(dips[most]),
+    )

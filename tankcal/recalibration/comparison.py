@@ -1,0 +1,409 @@
+"""`tankcal compare`: a former table and a new one of the same tank, on one basis and judged."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+from tankcal.job.rule_files import named_rule
+from tankcal.job.tables import Log
+from tankcal.messages import message
+from tankcal.recalibration.agreement import (
+    coverage_factor_of,
+    critical_correlation,
+    deliveries_between,
+    normalized_error,
+    uncertainty_at,
+    worst_by_error,
+    worst_by_share,
+)
+from tankcal.recalibration.basis import bring_to_one_basis
+from tankcal.recalibration.courses_of_tables import compared_courses
+from tankcal.recalibration.tank_facts import facts_of
+from tankcal.recalibration.verdict import (
+    WorstError,
+    ages_of,
+    decide,
+    legal_numbers,
+    tank_of_rules,
+    zero_limit_of,
+)
+from tankcal.record.comparison import (
+    ComparedDelivery,
+    ComparedRows,
+    ComparedTable,
+    ComparisonFile,
+    ComparisonRule,
+    Correlation,
+    Material,
+    ReadOut,
+    RoofInTable,
+    Waterfall,
+)
+from tankcal.record.schema import filled_from
+from tankcal.record.texts import warnings_of
+
+MINIMUM_M = (1.5, 2.0, 3.0)  # of deliveries
+DEFAULT_RULE = "france_2020_recalibration"
+JUDGED_PART = 0.1  # of the range, above which rows of a low tank are judged
+MOST_APART = 0.2  # of a volume, by which tables of one tank may differ
+PARTS_OF_HEIGHT = (0.2, 0.4, 0.6, 0.8, 1.0)  # of the waterfall
+ZERO_APART = 3.0  # standard uncertainties of a fitted zero that differs from a declared one
+LEAST_ZERO_M = 1e-3
+BEFORE_ZERO = ("temperature", "head", "roof")  # what is not taken off goes into a fitted zero
+
+
+@dataclass(frozen=True)
+class _Agreement:
+    """What E_n is made of."""
+
+    c: float | None
+    former_U: object
+    new_U: object
+    E_n: np.ndarray
+    c_limit: np.ndarray
+
+    @property
+    def used_c(self):
+        return 0.0 if self.c is None else self.c
+
+
+def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
+    """Compare a former table with a new one of the same tank.
+
+    Parameters
+    ----------
+    former, new : FormerTable
+        See `recalibration.reading.read_former`. `common` of either of them is the correlation of
+        their errors.
+    rule : (Rule, file name), optional
+        That the new table is judged by; None: the French rule of 2020.
+    courses : (heights, thicknesses), optional
+        Of an upright tank, m: (n,) each, where neither table is a record that has them.
+    fingerprints : (str, str)
+        SHA-256 of both files.
+
+    Returns
+    -------
+    record.comparison.ComparisonFile
+
+    Raises
+    ------
+    InputError
+        For tables of other kinds of tank, without a common range, or whose volumes are so
+        different that they are not of one tank, or of one unit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tankcal.recalibration.former import FormerTable
+    >>> dips = np.linspace(0.0, 8.0, 81)
+    >>> former = FormerTable("old.csv", dips, 100 * dips, U_m3=0.2 * dips, common=0.0)
+    >>> new = FormerTable("new.csv", dips, 100.05 * dips, U_m3=0.15 * dips)
+    >>> found = compare(former, new)
+    >>> found.verdict, round(float(found.rows.d_m3[-1]), 3), round(float(found.rows.E_n[-1]), 2)
+    ('keep', 0.4, 0.2)
+    """
+    c = _common(former, new)
+    _refuse_other_kinds(former, new)
+    facts = facts_of(former, new, courses)
+    chosen, file = rule or named_rule(DEFAULT_RULE, Log())
+    basis = bring_to_one_basis(former, new, facts)
+    _refuse_other_tanks(former, new, basis)
+    agreement = _agreement(former, new, basis, c)
+    deliveries = _deliveries(basis, agreement)
+    from_m, worst = _worst(basis, agreement, deliveries)
+    tank = tank_of_rules(facts, former, new)
+    of_rule = (chosen, tank, former, new)
+    legal = legal_numbers(*of_rule, basis, agreement.former_U, agreement.new_U)
+    ages = ages_of(*of_rule)
+    verdict = decide(legal, ages, basis, worst, c, zero_limit_of(chosen, tank))
+    is_default = rule is None
+    return ComparisonFile(
+        tank=_tank_id(former, new),
+        notice=_notice(former, new),
+        former=_table(former, fingerprints[0], agreement.former_U),
+        new=_table(new, fingerprints[1], agreement.new_U),
+        material=Material(facts.expansion_per_k, facts.modulus_pa, facts.material_is),
+        low_m=float(basis.height_m[0]),
+        high_m=float(basis.height_m[-1]),
+        interpolation_m3=basis.interpolation_m3,
+        steps=basis.saved_steps,
+        zero=basis.zero,
+        rows=_rows(basis, agreement),
+        waterfall=_waterfall(basis),
+        deliveries=deliveries,
+        courses=compared_courses(
+            facts, basis, agreement.former_U, agreement.new_U, agreement.used_c, _sd(former, new)
+        ),
+        correlation=_correlation(agreement, worst),
+        judged_from_m=from_m,
+        legal=legal,
+        ages=ages,
+        rule=filled_from(ComparisonRule, chosen, file=file, is_default=is_default),
+        verdict=verdict.code,
+        verified=verdict.verified,
+        reasons=list(verdict.reasons),
+        read=_read(former, new, basis),
+        warnings=warnings_of(_warnings(former, new, basis)),
+    )
+
+
+# ---- what cannot be compared
+
+
+def _common(former, new):
+    """The declared correlation, or None."""
+    one, two = former.common, new.common
+    if one is not None and two is not None and one != two:
+        expected = message(
+            "compare_two_correlations",
+            "common is {one:g} there and {two:g} for {other}; expected one correlation of both",
+            one=two,
+            two=one,
+            other=former.name,
+        )
+        raise InputError(Problem(new.name, expected))
+    return one if one is not None else two
+
+
+def _refuse_other_kinds(former, new):
+    if None in (former.kind, new.kind) or former.kind == new.kind:
+        return
+    expected = message(
+        "compare_other_kind",
+        "a {kind} tank, but {other} is of a {other_kind} one; expected two tables of one tank",
+        kind=new.kind,
+        other=former.name,
+        other_kind=former.kind,
+    )
+    raise InputError(Problem(new.name, expected))
+
+
+def _refuse_other_tanks(former, new, basis):
+    was, is_now, dip = basis.former_m3[-1], basis.new_m3[-1], basis.height_m[-1]
+    if abs(is_now - was) <= MOST_APART * max(abs(was), abs(is_now)):
+        return
+    expected = message(
+        "compare_other_tank",
+        "{new:.6g} m3 at {dip:g} m, but {former:.6g} m3 in {other}; expected two tables of one "
+        "tank, in the units that their headings name",
+        new=float(is_now),
+        dip=float(dip),
+        former=float(was),
+        other=former.name,
+    )
+    raise InputError(Problem(new.name, expected))
+
+
+# ---- the agreement
+
+
+def _sd(former, new):
+    return float(np.hypot(former.volume_quantum_m3, new.volume_quantum_m3) / np.sqrt(12))
+
+
+def _agreement(former, new, basis, c):
+    k = coverage_factor_of(new if new.U_m3 is not None else former)
+    dips = basis.height_m
+    former_U = uncertainty_at(
+        former, dips + basis.zero.height_m, basis.on_basis_m3, k, basis.interpolation_m3
+    )
+    new_U = uncertainty_at(new, dips, basis.new_m3, k)
+    d = basis.new_m3 - basis.on_basis_m3
+    of_rows = d, new_U.rows(), former_U.rows()
+    return _Agreement(
+        c, former_U, new_U,
+        normalized_error(*of_rows, 0.0 if c is None else c), critical_correlation(*of_rows),
+    )  # fmt: skip
+
+
+def _deliveries(basis, agreement):
+    found = []
+    U = agreement.former_U, agreement.new_U, agreement.used_c
+    use = np.flatnonzero(basis.for_use)
+    for minimum in MINIMUM_M:
+        pair = worst_by_share(basis, minimum)
+        if pair is None:
+            continue
+        one = deliveries_between(basis, *U, *pair)
+        found.append(_delivery(basis, minimum, "relative", one))
+        worst = worst_by_error(basis, *U, minimum, also=(pair, (use[0], use[-1])))
+        if worst is not None:
+            found.append(_delivery(basis, minimum, "E_n", worst))
+    return found
+
+
+def _delivery(basis, minimum, by, one):
+    low, high = int(one.low[0]), int(one.high[0])
+    d, former = float(one.d_m3[0]), float(one.former_m3[0])
+    return ComparedDelivery(
+        minimum_m=minimum,
+        by=by,
+        low_m=float(basis.height_m[low]),
+        high_m=float(basis.height_m[high]),
+        former_m3=former,
+        new_m3=former + d,
+        d_m3=d,
+        relative=d / former if former else np.nan,
+        U_former_m3=float(one.U_former_m3[0]),
+        U_new_m3=float(one.U_new_m3[0]),
+        E_n=float(one.E_n[0]),
+        c_limit=float(one.c_limit[0]),
+    )
+
+
+def _worst(basis, agreement, deliveries):
+    """(lowest dip whose row is judged, WorstError or None) of rows and deliveries."""
+    dips = basis.height_m
+    reach = dips[-1] - dips[0]
+    from_m = float(dips[0] + (MINIMUM_M[0] if reach > 2 * MINIMUM_M[0] else JUDGED_PART * reach))
+    judged = np.flatnonzero(basis.for_use & (dips >= from_m - 1e-9))
+    found = []
+    if len(judged) and not np.isnan(agreement.E_n[judged]).all():
+        row = int(judged[np.nanargmax(np.abs(agreement.E_n[judged]))])
+        d = float(basis.new_m3[row] - basis.on_basis_m3[row])
+        U = float(agreement.new_U.rows()[row]), float(agreement.former_U.rows()[row])
+        found.append((agreement.E_n[row], None, dips[row], d, *U, agreement.c_limit[row]))
+    found += [
+        (one.E_n, one.low_m, one.high_m, one.d_m3, one.U_new_m3, one.U_former_m3, one.c_limit)
+        for one in deliveries
+        if not np.isnan(one.E_n)
+    ]
+    if not found:
+        return from_m, None
+    E_n, low, high, d, U_new, U_former, c_limit = max(found, key=lambda one: abs(one[0]))
+    half = float(normalized_error(d, U_new, U_former, 0.5))
+    return from_m, WorstError(
+        float(E_n), half, low, float(high), d, U_new, U_former, float(c_limit)
+    )  # fmt: skip
+
+
+# ---- what is saved
+
+
+def _correlation(agreement, worst):
+    return Correlation(
+        c=agreement.c,
+        source="not_declared" if agreement.c is None else "declared",
+        worst_E_n=worst and worst.E_n,
+        worst_E_n_at_half=worst and worst.at_half,
+        c_limit=worst and worst.c_limit,
+        coverage_k=agreement.new_U.k if worst else None,
+    )
+
+
+def _rows(basis, agreement):
+    return ComparedRows(
+        height_m=basis.height_m,
+        former_m3=basis.former_m3,
+        former_on_basis_m3=basis.on_basis_m3,
+        new_m3=basis.new_m3,
+        d_m3=basis.new_m3 - basis.on_basis_m3,
+        U_former_m3=agreement.former_U.rows(),
+        U_new_m3=agreement.new_U.rows(),
+        E_n=agreement.E_n,
+        c_limit=agreement.c_limit,
+        for_use=basis.for_use,
+    )
+
+
+def _waterfall(basis):
+    """Rows at parts of the range: those for use that are nearest."""
+    use = np.flatnonzero(basis.for_use)
+    dips = basis.height_m[use]
+    at = [dips[0] + part * (dips[-1] - dips[0]) for part in PARTS_OF_HEIGHT]
+    chosen = dict.fromkeys(int(use[np.argmin(np.abs(dips - one))]) for one in at)
+    return [
+        Waterfall(
+            height_m=float(basis.height_m[row]),
+            former_m3=float(basis.former_m3[row]),
+            **{f"{name}_m3": float(one.added_m3[row]) for name, one in basis.steps.items()},
+            tank_m3=float(basis.new_m3[row] - basis.on_basis_m3[row]),
+            new_m3=float(basis.new_m3[row]),
+        )
+        for row in chosen
+    ]
+
+
+def _table(table, fingerprint, U):
+    return filled_from(
+        ComparedTable,
+        table,
+        sha256=fingerprint,
+        origin="table" if table.record is None else "record",
+        rows=len(table.height_m),
+        low_m=float(table.height_m[0]),
+        high_m=float(table.height_m[-1]),
+        top_volume_m3=float(table.volume_m3[-1]),
+        roof=filled_from(RoofInTable, table.roof),
+        k=None if table.U_m3 is None else table.k,
+        U_top_m3=None if table.U_m3 is None else float(table.U_m3[-1]),
+        U_of_deliveries=U.deliveries_by,
+    )
+
+
+def _tank_id(former, new):
+    for table in (new, former):
+        if table.record is not None:
+            return table.record["job"]["tank"].get("id")
+    return None
+
+
+def _notice(former, new):
+    """The notice on the papers of the new table, else of the former one; "" for none."""
+    records = [table.record for table in (new, former) if table.record is not None]
+    notices = [str(one["job"]["certificate"].get("notice") or "") for one in records]
+    return next(filter(None, notices), "")
+
+
+def _read(former, new, basis):
+    """What was read out of the tables because nobody declared it."""
+    found = []
+    for name, one in zip(("former", "new"), basis.densities, strict=True):
+        if one.head is not None:
+            sure = "sure" if one.head != "undecided" else "doubtful"
+            used, value, u = one.source == "read", one.read_kg_m3, one.u_kg_m3
+            found.append(ReadOut(name, f"head_{one.head}", value, u, "kg/m3", sure, used))
+    zero = basis.zero
+    if zero.fitted_m is not None:
+        is_seen = abs(zero.fitted_m) > ZERO_APART * (zero.fitted_u_m or 0.0)
+        is_seen &= all(basis.steps[one].state in ("done", "same") for one in BEFORE_ZERO)
+        found.append(
+            ReadOut(
+                "former", "zero", zero.fitted_m, zero.fitted_u_m, "m",
+                "sure" if is_seen else "doubtful", zero.source == "fitted",
+            )
+        )  # fmt: skip
+    for name, table in (("former", former), ("new", new)):
+        if table.record is None:
+            digit = table.volume_quantum_m3
+            found.append(ReadOut(name, "rounding_volume", digit, None, "m3", "sure", True))
+    return found
+
+
+def _warnings(former, new, basis):
+    """Problems that deserve a look: of both tables, and of their zeros."""
+    found = [*former.warnings, *new.warnings]
+    zero = basis.zero
+    if zero.source == "fitted":
+        text = message(
+            "compare_zero_or_bottom",
+            "all volumes differ by {volume:.4g} m3, as if the zero stood {height:.1f} mm higher; a "
+            "bottom that has changed looks the same: declare both reference heights to tell",
+            volume=zero.volume_m3,
+            height=1000 * zero.height_m,
+        )
+        found.append(Problem(new.name, text))
+    if zero.source == "reference_heights" and zero.fitted_m is not None:
+        apart = abs(zero.fitted_m - zero.height_m)
+        if apart > max(LEAST_ZERO_M, ZERO_APART * zero.fitted_u_m):
+            text = message(
+                "compare_zero_apart",
+                "the reference heights put the zero {declared:.1f} mm higher, the volumes "
+                "{fitted:.1f} mm; expected both alike, unless the bottom has changed",
+                declared=1000 * zero.height_m,
+                fitted=1000 * zero.fitted_m,
+            )
+            found.append(Problem(new.name, text))
+    return found

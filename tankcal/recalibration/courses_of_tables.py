@@ -1,0 +1,80 @@
+"""How the radius of each course differs between two tables that are on one basis."""
+
+import numpy as np
+
+from tankcal.recalibration.basis import radii_of_rows
+from tankcal.recalibration.difference import adjust_difference
+from tankcal.recalibration.upright_shell import Rings
+from tankcal.record.comparison import ComparedCourse
+
+
+def compared_courses(facts, basis, former_U, new_U, c, sd_m3):
+    """The `ComparedCourse` of each course that the rows reach; none where they are not known.
+
+    Parameters
+    ----------
+    facts : TankFacts
+    basis : OneBasis
+    former_U, new_U : TableUncertainty
+    c : float
+        Correlation of the errors of both tables.
+    sd_m3 : float
+        Of a difference of rows, by rounding.
+    """
+    if not facts.is_shell:
+        return []
+    difference = basis.new_m3 - basis.on_basis_m3
+    found = adjust_difference(facts, basis.height_m, difference, basis.new_m3, sd_m3, basis.for_use)
+    if found is None:
+        return []
+    new, edges = _radii(facts, basis), facts.edges_m()
+    changes = found.areas_m2 / (2 * np.pi * new)
+    rounding = found.u_areas_m2 / (2 * np.pi * new)
+    courses = []
+    for k in np.flatnonzero(np.isfinite(changes)):
+        u = _u_of_tables(basis, former_U, new_U, c, edges[k : k + 2], new[k])
+        u = None if u is None else float(np.hypot(u, rounding[k]))
+        courses.append(
+            ComparedCourse(
+                course=int(k) + 1,
+                bottom_m=float(edges[k]),
+                top_m=float(edges[k + 1]),
+                former_m=float(new[k] - changes[k]),
+                new_m=float(new[k]),
+                d_m=float(changes[k]),
+                u_m=u,
+                u_rounding_m=float(rounding[k]),
+                w=float(changes[k] / u) if u else None,
+            )
+        )
+    return courses
+
+
+def _radii(facts, basis):
+    """(courses,) radii in the new table: of its record, else by what its rows rise."""
+    if facts.inside_m is not None:
+        return facts.inside_m
+    rings = Rings(facts.edges_m(), facts.thickness_m, facts.modulus_pa, is_first_order=False)
+    density = basis.densities[1].kg_m3 or 0.0
+    return radii_of_rows(rings, basis.height_m, basis.new_m3, density)
+
+
+def _u_of_tables(basis, former_U, new_U, c, ends, radius):
+    """Standard uncertainty of a change of radius by those of what the course holds; or None.
+
+    u(r) = r u(V) / (2 V), V between the lowest and the highest row within the course.
+    """
+    dips = basis.height_m
+    inside = np.flatnonzero((dips >= ends[0] - 1e-9) & (dips <= ends[1] + 1e-9) & basis.for_use)
+    if len(inside) < 2:
+        return None
+    low, high = inside[:1], inside[-1:]
+    volume = basis.new_m3[high[0]] - basis.new_m3[low[0]]
+    parts = [
+        radius / 2 * float(one.deliveries(low, high)[0]) / one.k / volume
+        for one in (former_U, new_U)
+    ]
+    if np.isnan(parts).any():
+        return None
+    variance = parts[0] ** 2 + parts[1] ** 2 - 2 * c * parts[0] * parts[1]
+    return float(np.sqrt(max(variance, 0.0)))

@@ -1,0 +1,171 @@
+"""former.toml: what is known of a former table beside its rows, and the checks of it."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tankcal.job.checking import RELATIVE_DENSITY, missing_beside
+from tankcal.job.contract.kinds import KINDS
+from tankcal.job.contract.roof import KEYS as ROOF
+from tankcal.job.contract.roof import upside_down
+from tankcal.job.contract.shorthand import choice, number, positive
+from tankcal.job.entries import read_section, unknown_section
+from tankcal.job.fields import Field, is_blank
+from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
+from tankcal.job.tables import read_bytes
+from tankcal.linter.totals import NO_UNITS, Units
+from tankcal.messages import message
+from tankcal.recalibration.former import FormerRoof
+
+HEIGHT_UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+VOLUME_UNITS = {
+    "m3": 1.0,
+    "hL": 0.1,
+    "L": 0.001,
+    "bbl": 0.158987294928,
+    "gal": 0.003785411784,
+}
+
+FORMER = (
+    Field("file", "text", "name of the table's file, beside this one"),
+    Field("sheet", "text", "sheet of a workbook; blank: that of the longest table"),
+    Field("volume_column", "text", "heading of the column of volumes, where there are several"),
+    choice("height_unit", "unit of heights whose heading names none", tuple(HEIGHT_UNITS)),
+    choice("volume_unit", "unit of volumes whose heading names none", tuple(VOLUME_UNITS)),
+    choice("kind", "kind of tank", KINDS),
+    number("reference_temperature_c", "temperature of the shell that the table is for", -200, 300),
+    number("liquid_density_kg_m3", "of the head in the table, kg/m3; 0: without head", 0, 3000),
+    positive("U_m3", "expanded uncertainty of every volume, m3", 1e6),
+    positive("U_percent", "expanded uncertainty in percent of each volume", 100),
+    positive("u_m3", "standard uncertainty of every volume, m3", 1e6),
+    positive("u_percent", "standard uncertainty in percent of each volume", 100),
+    positive("k", "coverage factor of U", 100),
+    number("common", "correlation of its errors with those of the new table", 0, 1),
+    positive("rounding_m3", "value of the last digit of its volumes, m3", 1000),
+    positive("reference_height_m", "from the dip plate to the reference point, metres", 200),
+    Field("date", "date", "day of the calibration, year-month-day"),
+    Field("method", "text", "how the tank was measured"),
+    Field("laboratory", "text", "who calibrated it"),
+    Field("number", "text", "number of the certificate"),
+)
+SECTIONS = {"former": FORMER, "roof": ROOF}
+UNCERTAINTIES = ("U_m3", "U_percent", "u_m3", "u_percent")
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What former.toml says.
+
+    name    of the file
+    values  {key of [former]: value or None}
+    rows    {key: row of the file}
+    roof    FormerRoof or None
+    """
+
+    name: str = "former.toml"
+    values: dict = field(default_factory=lambda: dict.fromkeys(one.name for one in FORMER))
+    rows: dict = field(default_factory=dict)
+    roof: FormerRoof | None = None
+
+    def __getitem__(self, key):
+        return self.values[key]
+
+    @property
+    def units(self):
+        """Units of columns whose headings name none."""
+        height, volume = self["height_unit"], self["volume_unit"]
+        if height is None and volume is None:
+            return NO_UNITS
+        return Units(HEIGHT_UNITS.get(height), VOLUME_UNITS.get(volume))
+
+    @property
+    def uncertainty(self):
+        """(key, value) of the uncertainty that is declared, or None."""
+        given = [key for key in UNCERTAINTIES if self[key] is not None]
+        return (given[0], self[given[0]]) if given else None
+
+    def tell(self, log, key, expected):
+        """Note a problem of one key."""
+        log.problem(self.name, expected, self.rows.get(key), f"former.{key}")
+
+
+def read_declared(path, log):
+    """`Declared` of a former.toml (a Path); what is wrong with it goes to `log`.
+
+    Keys that are wrong count as not given, so that the table is judged in the same run.
+    """
+    path = Path(path)
+    data = read_bytes(path, log, MAX_SETTINGS_BYTES)
+    settings, sections = (None, {}) if data is None else read_toml(path.name, data, log)
+    if settings is None:
+        return Declared(path.name)
+    for section in settings:
+        if section not in SECTIONS:
+            expected = unknown_section(section, SECTIONS)
+            log.problem(path.name, expected, sections.get(section), f"[{section}]")
+    given = settings.get("former", {})
+    if not any(not is_blank(value.raw) for value in given.values()) and "former" not in settings:
+        expected = message("former_no_section", "missing section; expected [former] with its keys")
+        log.problem(path.name, expected, None, "[former]")
+    values = read_section(path.name, "former", FORMER, given, sections.get("former"), log)
+    rows = {key: value.row for key, value in given.items()}
+    roof = _roof(path.name, settings.get("roof"), sections.get("roof"), log)
+    found = Declared(path.name, values, rows, roof)
+    _check(found, log)
+    return found
+
+
+def _check(found, log):
+    """Uncertainties said once, U with its factor; a density that is one."""
+    given = [key for key in UNCERTAINTIES if found[key] is not None]
+    for key in given[1:]:
+        expected = message(
+            "former_two_uncertainties",
+            "given together with {other}; expected only one of {keys}",
+            other=given[0],
+            keys=[*UNCERTAINTIES],
+        )
+        found.tell(log, key, expected)
+    if given and given[0].startswith("U") and found["k"] is None and not found.rows.get("k"):
+        found.tell(log, "k", missing_beside(given[0]))
+    density = found["liquid_density_kg_m3"]
+    if density is not None and 0 < density < RELATIVE_DENSITY:
+        expected = message(
+            "former_relative_density",
+            "found {density:g}; expected kg/m3: is it a relative density?",
+            density=density,
+        )
+        found.tell(log, "liquid_density_kg_m3", expected)
+
+
+def _roof(file, given, row, log):
+    """FormerRoof of [roof], or None after telling what is wrong or missing."""
+    if given is None:
+        return None
+    told = len(log.problems)
+    values = read_section(file, "roof", ROOF, given, row, log)
+    if all(value is None for value in values.values()) and len(log.problems) == told:
+        return None
+    needed = ("mass_kg", "reference_density_kg_m3", "weighing")
+    filled = [key for key in given if not is_blank(given[key].raw)]
+
+    def tell(key, expected):
+        value = given.get(key)
+        log.problem(file, expected, value.row if value and value.row else row, f"roof.{key}")
+
+    for key in needed:
+        if key not in filled:
+            tell(key, missing_beside(filled[0] if filled else "[roof]"))
+    low, high = values["critical_bottom_m"], values["critical_top_m"]
+    for key, other in (("critical_bottom_m", high), ("critical_top_m", low)):
+        if key not in filled and other is not None:
+            tell(key, missing_beside("critical_top_m" if other is high else "critical_bottom_m"))
+    if None not in (low, high) and low >= high:
+        tell("critical_top_m", upside_down(low, high))
+    if len(log.problems) != told:
+        return None
+    return FormerRoof(
+        values["mass_kg"],
+        values["reference_density_kg_m3"],
+        values["weighing"],
+        None if low is None or high is None else (low, high),
+    )

@@ -1,0 +1,110 @@
+"""What `tankcal compare` is given: two tables, what is declared of them, courses, a rule."""
+
+import tomllib
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+from tankcal.errors import InputError
+from tankcal.job.rule_files import named_rule
+from tankcal.job.tables import Log
+from tankcal.messages import message
+from tankcal.recalibration.comparison import compare
+from tankcal.recalibration.read_courses import read_courses
+from tankcal.recalibration.reading import read_former
+from tankcal.record.comparison import ComparisonFile
+
+RECORD = "record.json"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What to compare, as paths.
+
+    Attributes
+    ----------
+    old, new : path
+        Tables in any form that `read_former` reads, or folders of results.
+    former, new_former : path or None
+        What is declared of them.
+    courses : path or None
+        courses.csv.
+    rule : str or None
+        Name of a shipped rule, or path of a file.
+    """
+
+    old: str | Path
+    new: str | Path
+    former: str | Path | None = None
+    new_former: str | Path | None = None
+    courses: str | Path | None = None
+    rule: str | None = None
+
+
+def compare_files(asked) -> ComparisonFile:
+    """Compare the tables of two files; all problems of all files are told at once.
+
+    Parameters
+    ----------
+    asked : Asked
+
+    Returns
+    -------
+    record.comparison.ComparisonFile
+
+    Raises
+    ------
+    InputError
+        With every problem of the tables, of what is declared of them, of courses.csv and the rule;
+        or with why the tables cannot be compared (`comparison.compare`).
+    """
+    log = Log()
+    old, former = _table(asked.old, asked.former, log)
+    recent, new = _table(asked.new, asked.new_former, log)
+    courses = None if asked.courses is None else _shell(asked.courses, log)
+    rule = None if asked.rule is None else named_rule(asked.rule, log)
+    log.stop_if_problems()
+    fingerprints = tuple(sha256(_rows_of(one).read_bytes()).hexdigest() for one in (old, recent))
+    return compare(former, new, rule=rule, courses=courses, fingerprints=fingerprints)
+
+
+def _table(source, declared, log):
+    """(path, FormerTable or None) of a file, or of the record in a folder of results."""
+    path = Path(source)
+    if path.is_dir():
+        folder, path = path, path / RECORD
+        if not path.is_file():
+            expected = message(
+                "compare_no_record",
+                "a folder without record.json; expected a table, or a folder of results",
+            )
+            log.problem(folder.name or str(folder), expected)
+            return path, None
+    try:
+        return path, read_former(path, declared)
+    except InputError as error:
+        log.problems += error.problems
+        return path, None
+
+
+def _rows_of(path):
+    """The file that holds the rows: beside a former.toml the one that it names."""
+    if path.suffix.lower() != ".toml":
+        return path
+    return path.parent / tomllib.loads(path.read_text(encoding="utf-8"))["former"]["file"]
+
+
+def _shell(path, log):
+    """(heights, thicknesses) in a courses.csv, m, from the bottom up; None after telling `log`."""
+    found = read_courses(path, log)
+    if found is None:
+        return None
+    if np.isnan(found.heights_m).any():
+        expected = message(
+            "compare_no_height",
+            "heights that are not known; expected all of them: tankcal read-table finds the seams",
+        )
+        log.problem(found.file, expected, None, "height_m")
+    return found.heights_m, found.thickness_m

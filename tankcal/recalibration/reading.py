@@ -1,0 +1,292 @@
+"""A former table from its file: rows by the linter's readers, the rest by former.toml."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from tankcal.errors import InputError
+from tankcal.job.tables import Log
+from tankcal.linter.rows import read_rows
+from tankcal.messages import message
+from tankcal.recalibration.declared import Declared, read_declared
+from tankcal.recalibration.former import FormerRoof, FormerTable
+from tankcal.record import load
+
+MOST_FINDINGS = 20  # of the linter, that a refusal repeats
+USUAL_K = 2.0
+_RECORD_VALUES = (
+    "reference_temperature_c", "liquid_density_kg_m3", "reference_height_m", "date", "method",
+    "laboratory", "number", "kind",
+)  # fmt: skip
+
+
+def read_former(path, former_toml=None) -> FormerTable:
+    """Read a former capacity table.
+
+    Parameters
+    ----------
+    path : path
+        A CSV file, an Excel workbook (.xlsx), a PDF with a text table, or a record.json of
+        tankcal; heights in any unit that its headings name, feet and inches, or ullages. Or a
+        former.toml that names such a file under `file`.
+    former_toml : path, optional
+        The former.toml that says what else is known of it (docs/read-table.md).
+
+    Returns
+    -------
+    FormerTable
+        In SI units, dips rising; the linter's warnings under `warnings`.
+
+    Raises
+    ------
+    InputError
+        With every problem: of former.toml; of a file that cannot be read; the findings of the
+        linter, where it calls the table wrong; of units, columns or a reference height that are
+        not clear.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from tankcal.recalibration.reading import read_former
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "old.csv")
+    ...     size = path.write_text("Dip (cm);Volume (L)\\n0;0\\n10;1629\\n20;3259\\n30;4889\\n")
+    ...     former = read_former(path)
+    >>> former.height_m.tolist(), former.volume_m3.tolist(), former.volume_quantum_m3
+    ([0.0, 0.1, 0.2, 0.3], [0.0, 1.629, 3.259, 4.889], 0.001)
+    """
+    path, log = Path(path), Log()
+    declared = Declared()
+    if former_toml is None and path.suffix.lower() == ".toml":
+        former_toml = path
+        declared = read_declared(path, log)
+        path = _named_file(declared, path, log)
+    elif former_toml is not None:
+        declared = read_declared(former_toml, log)
+        _check_name(declared, path, log)
+    rows, warnings = _rows(path, declared, log)
+    if rows is None:
+        log.stop_if_problems()
+        raise AssertionError("no rows, and nothing told")
+    record = _record(path)
+    if record is None:
+        former = _of_rows(path, rows, declared, log)
+    else:
+        former = _of_record(path, record, declared, log)
+    log.stop_if_problems()
+    return replace(former, warnings=warnings + tuple(log.warnings))
+
+
+def _named_file(declared, path, log):
+    """The table's file that a former.toml names; InputError where it names none."""
+    if declared["file"] is None:
+        if not log.problems:
+            expected = message("former_no_file", "missing; expected the table's file")
+            declared.tell(log, "file", expected)
+        log.stop_if_problems()
+    named = Path(declared["file"])
+    if named.name != declared["file"] or named.name in (".", ".."):
+        expected = message(
+            "former_file_elsewhere",
+            "found {found}; expected the plain name of a file beside former.toml",
+            found=declared["file"],
+        )
+        declared.tell(log, "file", expected)
+        log.stop_if_problems()
+    return path.parent / named
+
+
+def _check_name(declared, path, log):
+    if declared["file"] is not None and Path(declared["file"]).name != path.name:
+        expected = message(
+            "former_other_file",
+            "found {found}, but the table is {name}; expected what is known of that one",
+            found=declared["file"],
+            name=path.name,
+        )
+        declared.tell(log, "file", expected)
+
+
+def _rows(path, declared, log):
+    """(TableRows or None, warnings), the linter's errors told to `log`."""
+    try:
+        rows, report = read_rows(
+            path, log, declared["sheet"], declared.units, declared["volume_column"]
+        )
+    except InputError as error:
+        log.problems += error.problems[:MOST_FINDINGS]
+        return None, ()
+    errors = [one.problem for one in report.findings if one.severity == "error"]
+    if errors:
+        expected = message(
+            "former_is_wrong",
+            "the table has errors ({count}), so nothing is computed from it; correct them first "
+            "(tankcal lint shows all)",
+            count=len(errors),
+        )
+        log.problem(path.name, expected)
+        log.problems += errors[:MOST_FINDINGS]
+        return None, ()
+    return rows, tuple(one.problem for one in report.findings)
+
+
+def _record(path):
+    """The record in a file, of the last version; None of any other file."""
+    with path.open("rb") as file:
+        start = file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n")
+    return load(path) if path.suffix.lower() == ".json" or start[:1] == b"{" else None
+
+
+def _of_rows(path, rows, declared, log):
+    """FormerTable of rows and of what is declared."""
+    height = rows.height_m
+    if rows.is_ullage:
+        height = _dips(rows, declared, log)
+    U, k = _uncertainty(rows, declared, log)
+    quantum = declared["rounding_m3"] or rows.volume_quantum_m3
+    return FormerTable(
+        name=str(rows.name),
+        height_m=height,
+        volume_m3=rows.volume_m3,
+        height_quantum_m=rows.height_quantum_m,
+        volume_quantum_m3=quantum,
+        U_m3=U,
+        k=k,
+        common=declared["common"],
+        roof=declared.roof,
+        height_rounding_m=rows.height_rounding_m,
+        row=rows.row,
+        **{key: declared[key] for key in _RECORD_VALUES},
+    )
+
+
+def _dips(rows, declared, log):
+    """(rows,) dips of ullages, by the reference height."""
+    reference = declared["reference_height_m"]
+    if reference is None:
+        expected = message(
+            "former_ullages",
+            "a table of ullages; expected reference_height_m in former.toml, from the dip plate "
+            "to the point that ullages count from",
+        )
+        log.problem(rows.name, expected)
+        return rows.height_m
+    dips = np.round(reference + rows.height_m, 9)
+    lowest = float(dips[0])
+    if lowest < -rows.height_quantum_m - 1e-9:
+        expected = message(
+            "former_low_reference",
+            "the largest ullage is {ullage:g} m, {below:g} m more than reference_height_m; "
+            "expected a reference height of at least that",
+            ullage=-float(rows.height_m[0]),
+            below=-lowest,
+        )
+        log.problem(rows.name, expected, int(rows.row[0]))
+    return dips
+
+
+def _uncertainty(rows, declared, log):
+    """((rows,) U in m3 or None, k), of the table or as declared."""
+    k = rows.k if rows.k is not None else declared["k"]
+    in_table = rows.U_m3 is not None or rows.u_m3 is not None
+    if declared.uncertainty is not None and in_table:
+        expected = message(
+            "former_U_twice",
+            "given, but the table has a column of uncertainties; expected only one of them",
+        )
+        declared.tell(log, declared.uncertainty[0], expected)
+        return None, USUAL_K
+    if not in_table and declared.uncertainty is None:
+        return None, k or USUAL_K
+    if k is None:
+        k = USUAL_K
+        if rows.U_m3 is not None:
+            text = message(
+                "former_no_factor",
+                "expanded uncertainties without a coverage factor: taken as k = {k:g}",
+                k=k,
+            )
+            log.warning(rows.name, text)
+    if rows.U_m3 is not None:
+        return rows.U_m3, k
+    if rows.u_m3 is not None:
+        return k * rows.u_m3, k
+    key, value = declared.uncertainty
+    scale = rows.volume_m3 / 100 if key.endswith("percent") else np.ones(len(rows.volume_m3))
+    return (value if key.startswith("U") else k * value) * scale, k
+
+
+def _of_record(path, record, declared, log):
+    """FormerTable of a record; what is declared beside it must not contradict it."""
+    table, job = record["capacity"], record["job"]
+    certificate, choices = job.get("certificate") or {}, _choices(record)
+    density = choices.get("head", job["table"].get("liquid_density_kg_m3"))
+    survey = job.get("survey") or {}
+    values = {
+        "reference_temperature_c": job["table"].get("reference_temperature_c"),
+        "liquid_density_kg_m3": density if isinstance(density, int | float) else 0.0,
+        "reference_height_m": (job.get("datum") or {}).get("reference_height_m"),
+        "date": survey.get("date"),
+        "method": certificate.get("method") or choices.get("survey"),
+        "laboratory": certificate.get("laboratory"),
+        "number": certificate.get("number"),
+        "kind": job["tank"].get("kind"),
+    }
+    for key in _RECORD_VALUES:
+        said = declared[key]
+        if values[key] is None:
+            values[key] = said
+        elif said is not None and not _same(said, values[key]):
+            expected = message(
+                "former_against_record",
+                "found {found}, but the record has {has}; expected no such key: it is taken from "
+                "the record",
+                found=str(said),
+                has=str(values[key]),
+            )
+            declared.tell(log, key, expected)
+    for key in ("U_m3", "U_percent", "u_m3", "u_percent", "k", "rounding_m3"):
+        if declared[key] is not None:
+            expected = message(
+                "former_known_to_record",
+                "given for a record of tankcal, which has it; expected no such key",
+            )
+            declared.tell(log, key, expected)
+    return FormerTable(
+        name=path.name,
+        height_m=np.array(table["height_m"], dtype=float),
+        volume_m3=np.array(table["volume_m3"], dtype=float),
+        U_m3=np.array(table["stated_U_m3"], dtype=float),
+        k=float(np.median(table["k"])),
+        common=declared["common"],
+        roof=_roof_of(record) or declared.roof,
+        factor_m3=np.array(table["factor_m3"], dtype=float),
+        record=record,
+        **values,
+    )
+
+
+def _choices(record):
+    return {one["code"]: one["value"] for one in record["choices"]}
+
+
+def _same(said, has):
+    if isinstance(said, int | float) and isinstance(has, int | float):
+        return abs(said - has) <= 1e-9 * max(abs(said), abs(has))
+    return said == has
+
+
+def _roof_of(record):
+    """FormerRoof whose displacement the record's table has deducted, or None."""
+    details = {one["code"]: one["value"] for one in record.get("roof") or ()}
+    if not details or _choices(record).get("roof") == "off":
+        return None
+    critical = details.get("roof_critical_bottom"), details.get("roof_critical_top")
+    return FormerRoof(
+        float(details["roof_mass"]),
+        float(details["roof_reference_density"]),
+        details["roof_weighing"],
+        None if None in critical else tuple(map(float, critical)),
+    )

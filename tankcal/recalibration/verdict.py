@@ -1,0 +1,298 @@
+"""Keep, recompute or recalibrate: what a rule and the agreement of two tables say.
+
+recalibrate  a number is beyond the limit of the rule, |E_n| is above 1, the former table is older
+             than the rule lets it become, or all volumes differ as by a zero that nobody declared
+             and that is more than the rule lets a reference height differ
+recompute    the tank itself agrees; zero, temperature, head or roof are not those of the new table
+keep         nothing differs
+"""
+
+from dataclasses import dataclass
+from datetime import date
+
+import numpy as np
+
+from tankcal.record.comparison import LegalNumber, Reason, TableAge
+from tankcal.tank.capacity import Quantity
+from tankcal.tank.rules.deviation import StatedVolume, judge_volume
+
+DAYS_OF_YEAR = 365.25
+USUAL_LIMIT_M = 5e-3  # of a zero that nobody declared, where a rule has no limit
+ON_BASIS = ("zero", "temperature", "head", "roof")  # what a new computation mends
+FAILED = ("fails", "guard_band")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The verdict, whether all of its values were read in the text itself, and its reasons."""
+
+    code: str | None
+    verified: bool
+    reasons: tuple[Reason, ...]
+
+
+@dataclass(frozen=True)
+class WorstError:
+    """The row or delivery with the largest |E_n| of those that are judged.
+
+    Attributes
+    ----------
+    E_n, at_half : float
+        With the declared c, or 0; with c = 0.5.
+    low_m : float or None
+        Of a delivery.
+    high_m : float
+    d_m3, U_new_m3, U_former_m3, c_limit : float
+    """
+
+    E_n: float
+    at_half: float
+    low_m: float | None
+    high_m: float
+    d_m3: float
+    U_new_m3: float
+    U_former_m3: float
+    c_limit: float
+
+    @property
+    def place(self):
+        """{name: value} of where it is, for a Reason; of a row without low_m."""
+        low = {} if self.low_m is None else {"low_m": self.low_m}
+        return low | {"high_m": self.high_m, "d_m3": self.d_m3}
+
+
+def tank_of_rules(facts, former, new):
+    """The kind of tank in the words of the rules."""
+    if facts.kind == "vertical":
+        has_roof = former.roof is not None or new.roof is not None
+        return "vertical_floating_roof" if has_roof else "vertical_fixed_roof"
+    return facts.kind if facts.kind in ("horizontal", "sphere") else "other"
+
+
+# ---- the numbers of a rule
+
+
+def legal_numbers(rule, tank, former, new, basis, former_U, new_U):
+    """The `LegalNumber` of each limit of a rule that is for a kind of tank."""
+    found = [
+        _deviation(one, basis, former_U, new_U)
+        for one in rule.deviation
+        if is_for(one, tank) and basis.for_use.any()
+    ]
+    heights = [one for one in rule.reference_height if is_for(one, tank)]
+    return [*found, *(_reference_height(one, former, new) for one in heights)]
+
+
+def is_for(limit, tank):
+    """Whether a limit is for a kind of tank."""
+    return not limit.tanks or tank in limit.tanks
+
+
+def _deviation(limit, basis, former_U, new_U):
+    use = np.flatnonzero(basis.for_use)
+    low, high, code = _rows_of(limit, basis, use)
+    stated = _volume(basis.on_basis_m3, low, high)
+    value = _volume(basis.new_m3, low, high)
+    U = (
+        new_U.rows()[high]
+        if low is None
+        else new_U.deliveries(np.array([low]), np.array([high]))[0]
+    )
+    known = 0.0 if np.isnan(U) else float(U)
+    dips = [float(basis.height_m[one]) for one in (low, high) if one is not None]
+    found = judge_volume(
+        limit,
+        StatedVolume(stated, dips[-1], dips[0] if low is not None else None),
+        Quantity(value, known / new_U.k, np.inf, new_U.k, known),
+        known,
+    )
+    printed = _volume(basis.former_m3, low, high)
+    if limit.limit is not None:
+        unit, size = "%", 100 * limit.limit
+        numbers = 100 * (value - stated) / abs(stated), 100 * (value - printed) / abs(printed)
+    else:
+        unit, size = "m3", limit.limit_m3
+        numbers = value - stated, value - printed
+    unknown = limit.guard == "U" and np.isnan(U)
+    return LegalNumber(
+        code=code,
+        limit=float(size),
+        unit=unit,
+        value=float(numbers[0]),
+        as_printed=float(numbers[1]),
+        at_m=dips,
+        verdict="not_judged" if unknown else found.code,
+        clause=limit.clause,
+        verified=limit.verified,
+    )
+
+
+def _rows_of(limit, basis, use):
+    """(low or None, high, code) rows that a limit is judged at."""
+    if limit.of == "capacity":
+        return None, use[-1], "top"
+    if limit.of == "deliveries":
+        return use[0], use[-1], "range"
+    share = np.abs(basis.new_m3 - basis.on_basis_m3)[use]
+    share = share / np.maximum(basis.on_basis_m3[use], 1e-9)
+    if limit.limit is None:
+        share = np.abs(basis.new_m3 - basis.on_basis_m3)[use]
+    return None, use[int(np.argmax(share))], "row"
+
+
+def _volume(volumes, low, high):
+    return float(volumes[high] - (0.0 if low is None else volumes[low]))
+
+
+def _reference_height(limit, former, new):
+    value = None
+    if former.reference_height_m is not None and new.reference_height_m is not None:
+        value = 1000 * (new.reference_height_m - former.reference_height_m)
+    verdict = "not_judged"
+    if value is not None:
+        kept = abs(value) <= 1000 * limit.limit_m * (1 + 1e-9)
+        verdict = "conforms" if kept else "fails"
+    return LegalNumber(
+        code="reference_height",
+        limit=1000 * limit.limit_m,
+        unit="mm",
+        value=value,
+        as_printed=value,
+        at_m=[],
+        verdict=verdict,
+        clause=limit.clause,
+        verified=limit.verified,
+    )
+
+
+def ages_of(rule, tank, former, new):
+    """The `TableAge` of each period of a rule that is for a kind of tank."""
+    years = _years_between(former.date, new.date)
+    return [
+        TableAge(
+            name=one.name,
+            of=one.of,
+            years=one.years,
+            age_years=years,
+            verdict="not_judged" if years is None else "fails" if years > one.years else "conforms",
+            clause=one.clause,
+            verified=one.verified,
+        )
+        for one in rule.periods
+        if is_for(one, tank)
+    ]
+
+
+def _years_between(before, after):
+    """Years between two dates as texts; None where one is not known, or the order is wrong."""
+    try:
+        first, last = (date.fromisoformat(str(one)[:10]) for one in (before, after))
+    except ValueError:
+        return None
+    years = (last - first).days / DAYS_OF_YEAR
+    return None if years < 0 else years
+
+
+# ---- the verdict
+
+
+def zero_limit_of(rule, tank):
+    """Largest zero (m) that may be taken for one without being declared: of the rule, or usual."""
+    return min((one.limit_m for one in rule.reference_height if is_for(one, tank)),
+               default=USUAL_LIMIT_M)  # fmt: skip
+
+
+def decide(legal, ages, basis, worst, c, zero_limit_m):
+    """The Verdict.
+
+    Parameters
+    ----------
+    legal : sequence of LegalNumber
+    ages : sequence of TableAge
+    basis : OneBasis
+    worst : WorstError or None
+        None: a U is not known.
+    c : float or None
+        Declared correlation.
+    zero_limit_m : float
+        A zero that is fitted, not declared, may be no larger: else the bottom may have changed.
+    """
+    steps, zero = basis.steps, basis.zero
+    grave = [*_broken(legal), *_differing(worst, c)]
+    if zero.source == "fitted" and abs(zero.height_m) > zero_limit_m:
+        volumes = {"d_m3": zero.volume_m3, "zero_mm": 1000 * zero.height_m}
+        grave.append(Reason("zero_not_explained", volumes | {"most_mm": 1000 * zero_limit_m}))
+    grave += _too_old(ages)
+    judged = [one for one in (*legal, *ages) if one.verdict != "not_judged"]
+    differing = [name for name in ON_BASIS if steps[name].state == "done"]
+    undone = {
+        name: list(step.lacking)
+        for name, step in steps.items()
+        if step.state in ("not_declared", "not_possible")
+    }
+    mild = []
+    if differing:
+        mild.append(Reason("basis_differs", {"steps": differing}))
+    mild += [Reason("step_not_done", {"step": n, "lacking": what}) for n, what in undone.items()]
+    mild += _agreeing(worst, c)
+    kept = [one.code for one in legal if one.verdict == "conforms"]
+    if kept:
+        mild.append(Reason("limits_kept", {"limits": kept}))
+    mild += [
+        Reason("limit_not_judged", {"limit": one.code})
+        for one in legal
+        if one.verdict == "not_judged"
+    ]
+    mild += [
+        Reason("age_not_judged", {"of": one.of, "years": one.years})
+        for one in ages
+        if one.verdict == "not_judged"
+    ]
+    code = "recalibrate" if grave else "recompute" if differing else "keep"
+    if not (grave or worst or any(one in legal for one in judged)):
+        code, grave = None, [Reason("nothing_to_judge", {})]
+    return Verdict(code, all(one.verified for one in judged), (*grave, *mild))
+
+
+def _broken(legal):
+    return [
+        Reason(
+            "limit_exceeded" if one.verdict == "fails" else "in_guard_band",
+            {"limit": one.code, "value": one.value, "most": one.limit, "unit": one.unit},
+        )
+        for one in legal
+        if one.verdict in FAILED
+    ]
+
+
+def _too_old(ages):
+    return [
+        Reason(
+            "age_of_bottom_course_exceeded" if one.of == "bottom_course" else "age_exceeded",
+            {"age": one.age_years, "years": one.years},
+        )
+        for one in ages
+        if one.verdict == "fails"
+    ]
+
+
+def _differing(worst, c):
+    if worst is None or not abs(worst.E_n) > 1:
+        return []
+    return [Reason("tank_differs", {"E_n": _finite(worst.E_n), "c": c or 0.0, **worst.place})]
+
+
+def _agreeing(worst, c):
+    found = []
+    if worst is None:
+        return [Reason("E_n_not_known", {})]
+    if abs(worst.E_n) <= 1:
+        found.append(Reason("tank_agrees", {"E_n": worst.E_n, "c": c or 0.0, **worst.place}))
+    if c is None:
+        limit = None if np.isnan(worst.c_limit) else worst.c_limit
+        found.append(Reason("c_not_declared", {"c_limit": limit}))
+    return found
+
+
+def _finite(value):
+    return value if np.isfinite(value) else None

@@ -1,0 +1,128 @@
+"""What `tankcal compare` leaves behind: the comparison on paper, as a page, a workbook and CSV.
+
+Nothing here computes a number: all of it is made from comparison.json.
+"""
+
+import json
+from pathlib import Path
+
+from tankcal.errors import InputError, Problem, TankcalError, VocabularyError
+from tankcal.messages import message
+from tankcal.record import save
+from tankcal.record.comparison import COMPARISON, plain_of_comparison
+from tankcal.report import folders
+from tankcal.report.comparison.paper import FILE, WORKBOOK, ComparisonPaper
+from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL
+
+__all__ = [
+    *("FILES", "ComparisonPaper", "comparison_file", "rebuild", "refuse_foreign"),
+    "write_comparison",
+]
+
+PDF, PAGE = "comparison.pdf", "comparison.html"
+TABLES = {
+    "rows.csv": ROWS,
+    "waterfall.csv": WATERFALL,
+    "deliveries.csv": DELIVERIES,
+    "courses.csv": COURSES,
+}
+FILES = (FILE, *TABLES, WORKBOOK, PDF, PAGE)
+
+
+def write_comparison(found, folder, language=None, progress=None, letterhead=None):
+    """Write comparison.json, CSV files, workbook, PDF and web page, all or nothing.
+
+    Parameters
+    ----------
+    found : ComparisonFile or dict
+        Of `recalibration.comparison.compare`, or the same as plain data.
+    folder : path
+        Made when missing; an earlier comparison there is replaced, and a folder that holds
+        anything else is refused.
+    language : str, optional
+        Of papers and workbook, one of languages.LANGUAGES; None: English.
+    progress : callable, optional
+        Called with a line of text as each step begins.
+    letterhead : report.letterhead.Letterhead, optional
+        Of who compares.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    InputError
+        For a folder that is not tankcal's to replace, and what is no comparison.
+    """
+    refuse_foreign(folder)
+    progress = progress or (lambda text: None)
+    plain = found if isinstance(found, dict) else plain_of_comparison(found)
+    paper = ComparisonPaper(plain, language, letterhead)
+    with folders.replaced(folder) as temporary:
+        _write(paper, temporary, progress)
+    return [path for path in (Path(folder) / name for name in FILES) if path.exists()]
+
+
+def rebuild(source, folder, language=None, progress=None, letterhead=None):
+    """Write the same from a comparison.json alone; arguments as of `write_comparison`."""
+    found = load(source)
+    try:
+        return write_comparison(found, folder, language, progress, letterhead)
+    except VocabularyError as error:
+        what = str(error)
+    except TankcalError:
+        raise
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        what = f"{type(error).__name__}: {error}"
+    expected = message(
+        "no_comparison", "does not have the content of a comparison ({what})", what=what
+    )
+    raise InputError(Problem(Path(source).name, expected))
+
+
+def comparison_file(path):
+    """The comparison that a path names, the file or its folder; None where it names none."""
+    path = Path(path)
+    if path.is_dir():
+        path = path / FILE
+        return path if path.is_file() else None
+    return path if path.name == FILE else None
+
+
+def load(path):
+    """Read a comparison.json; raises InputError when it is none."""
+    name = Path(path).name
+    try:
+        found = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        expected = message(
+            "comparison_unreadable", "cannot be read as a comparison: {error}", error=str(error)
+        )
+        raise InputError(Problem(name, expected)) from error
+    return COMPARISON.migrated(found, name)
+
+
+def refuse_foreign(folder):
+    """Raise InputError when `folder` exists and holds anything but results of a comparison."""
+    folders.refuse_foreign(folder, FILES)
+
+
+def _write(paper, folder, progress):
+    from tankcal.report.comparison import workbook
+    from tankcal.report.comparison.pages import pages
+    from tankcal.report.outputs.csv_files import write_table
+    from tankcal.report.pdf import pdf
+    from tankcal.report.web import page
+
+    progress(message("comparison_tables", "writing the tables"))
+    save(paper.saved, folder / FILE)
+    for name, table in TABLES.items():
+        if rows := table.rows(paper.found):
+            write_table(table, folder / name, rows)
+    workbook.write(paper, folder / WORKBOOK)
+    progress(message("comparison_papers", "setting the papers"))
+    blocks = [block.data for block in pages(paper, folder)]
+    (folder / PDF).write_bytes(pdf(blocks, folder))
+    whole = [block.data for block in pages(paper, whole=True)]
+    (folder / PAGE).write_text(page(whole), encoding="utf-8")
