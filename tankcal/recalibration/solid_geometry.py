@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.recalibration.former import FormerTable
-from tankcal.tank.heads import End, depth_of
+from tankcal.tank.heads import End
 from tankcal.tank.solids import LyingTank, Sphere
 
 FEWEST_ROWS = 8
@@ -100,6 +100,15 @@ class SolidFit:
         """(value, u) of an unknown."""
         k = self.names.index(name)
         return float(self.values[k]), float(self.u[k])
+
+    @property
+    def below_bottom_m(self):
+        """How far the table's dips begin below the inside bottom; 0 where that is no more than u.
+
+        A job has no dip plate there: its dips are less than the table's by this.
+        """
+        zero, u = self["zero"]
+        return max(-zero, 0.0) if -zero > 3 * u else 0.0
 
     @property
     def mirrored(self):
@@ -251,7 +260,7 @@ def _again(rows, one, dip_from_a_m):
 
 
 def declared_sizes(fit: SolidFit) -> dict:
-    """The keys of [horizontal] or [sphere], and the dip plate, of a job with these sizes.
+    """The sections of a job.toml that hold the sizes: [horizontal] or [sphere], and [datum].
 
     Parameters
     ----------
@@ -260,9 +269,10 @@ def declared_sizes(fit: SolidFit) -> dict:
     Returns
     -------
     dict
-        {section: {key: value}}.
+        {section: {key: value}}. A zero below the bottom (`SolidFit.below_bottom_m`) becomes the
+        bottom.
     """
-    datum = {"datum": {"dip_plate_z_m": _rounded(fit["zero"][0])}}
+    datum = {"datum": {"dip_plate_z_m": _rounded(max(fit["zero"][0], 0.0))}}
     if fit.kind == "sphere":
         return {"sphere": {"diameter_m": _rounded(fit["diameter"][0])}} | datum
     tank = fit.tank
@@ -277,6 +287,44 @@ def declared_sizes(fit: SolidFit) -> dict:
     if tank.tilt:
         keys |= {"tilt_mm_per_m": _rounded(1000 * tank.tilt), "dip_from_a_m": tank.dip_from_a_m}
     return {"horizontal": keys} | datum
+
+
+def declared_job(fit: SolidFit, former: FormerTable, tank_id: str) -> dict:
+    """The sections of a job.toml with declared sizes, for the table of the same conditions.
+
+    Parameters
+    ----------
+    fit : SolidFit
+    former : FormerTable
+    tank_id : str
+
+    Returns
+    -------
+    dict
+        {section: {key: value}}; what the former table does not say is "": to be filled in. The
+        sizes count as measured inside at the former reference temperature, so that another one
+        under [table] is a correction.
+    """
+    temperature = former.reference_temperature_c
+    temperature = "" if temperature is None else temperature
+    steps = np.diff(former.height_m)
+    sections = {
+        "tank": {"id": tank_id, "kind": fit.kind},
+        "survey": {
+            "side": "inside",
+            "date": former.date or "",
+            "shell_temperature_c": temperature,
+        },
+        "table": {
+            "step_m": _rounded(np.median(steps)),
+            "reference_temperature_c": temperature,
+        },
+    }
+    for section, keys in declared_sizes(fit).items():
+        sections[section] = keys
+    if former.reference_height_m is not None:
+        sections["datum"]["reference_height_m"] = former.reference_height_m
+    return sections
 
 
 def declared_uncertainties(fit: SolidFit, former: FormerTable) -> list[dict]:
@@ -494,6 +542,6 @@ def _rounded(value):
 
 
 __all__ = [
-    "ENDS", "LyingGeometry", "SolidFit", "declared_sizes", "declared_uncertainties", "depth_of",
-    "fit_lying", "fit_sphere",
+    "ENDS", "LyingGeometry", "SolidFit", "declared_job", "declared_sizes",
+    "declared_uncertainties", "fit_lying", "fit_sphere",
 ]  # fmt: skip
