@@ -5,7 +5,16 @@ import os
 import sys
 
 import tankcal
-from tankcal.cli import camera, importing, linting, planning, reporting, running, starting
+from tankcal.cli import (
+    camera,
+    importing,
+    linting,
+    planning,
+    reporting,
+    running,
+    starting,
+    table_reading,
+)
 from tankcal.cli.help_words import argparse_in, put_in_words
 from tankcal.cli.machine import failure, print_json
 from tankcal.cli.showing import complain, speak, words_of_run
@@ -25,6 +34,7 @@ a new tank, step by step:
   tankcal run my-tank/job.xlsx  the same, from the workbook
   tankcal report my-tank/results --language es   the papers again, in Spanish
   tankcal lint table.csv        look for mistakes in any capacity table
+  tankcal read-table old.csv --courses courses.csv   radii and head out of a former table
 
 photographs, distances, angles and levels instead of surveyed points:
   tankcal new my-tank --survey photos          (or total-station) write such a job
@@ -97,7 +107,7 @@ def _parser():
     parser.set_defaults(command=None, shown=parser)
     commands = parser.add_subparsers(metavar="COMMAND")
 
-    for room in (running, reporting, starting, importing, planning, linting, camera):
+    for room in (running, reporting, starting, importing, planning, linting, table_reading, camera):
         room.add(commands)
     if words_of_run():
         put_in_words(parser, words_of_run())

@@ -35,11 +35,12 @@ def add(commands):
         "--survey",
         choices=(
             *("photos", "total-station", "strapping", "reference-line", "wall-hits", "tangents"),
-            *("triangulation", "cloud", "liquid"),
+            *("triangulation", "cloud", "liquid", "radii"),
         ),
         help="with files for photographs, total-station readings, circumferences by tape, "
         "offsets from reference lines, bare hits of the wall, tangents, triangulation with a "
-        "stadia, point clouds or (of any kind of tank) metered liquid, in place of surveyed points",
+        "stadia, point clouds, (of any kind of tank) metered liquid, or the radii of a former "
+        "table, in place of surveyed points",
     )
     new.set_defaults(command=_new)
 

@@ -49,11 +49,13 @@ class Attached:
     covariance_m2  (3n, 3n) of its points
     mesh           ((name, SHA-256, size), bytes)
     rule           (Rule, (name, SHA-256, size) of its file, or None: it ships with tankcal)
+    radii_covariance_m2  (n, n) of its radii
     """
 
     covariance_m2: np.ndarray | None
     mesh: tuple | None
     rule: tuple[Rule, tuple | None] | None
+    radii_covariance_m2: np.ndarray | None = None
 
     @property
     def files(self):

@@ -6,16 +6,17 @@ from tankcal.errors import SHEET
 from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
 from tankcal.job.checking import has_rows
 from tankcal.job.checks import check_all
-from tankcal.job.checks.extent import has_survey, is_metered, is_sighted, is_strapped
+from tankcal.job.checks.extent import has_radii, has_survey, is_metered, is_sighted, is_strapped
 from tankcal.job.clouds import make_clouds
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.contract.clouds import KINDS as OF_CLOUDS
-from tankcal.job.covariance import read_covariance
+from tankcal.job.covariance import OF_RADII, read_covariance
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
 from tankcal.job.hits import make_hits
 from tankcal.job.lines import make_lines
 from tankcal.job.liquid import make_metering
 from tankcal.job.measuring import make_measurements
+from tankcal.job.radii import make_radii
 from tankcal.job.rule_files import find_rule
 from tankcal.job.strapping import make_strapping
 from tankcal.job.tables import (
@@ -23,6 +24,8 @@ from tankcal.job.tables import (
     COVARIANCE_FILE,
     HITS_TABLES,
     LIQUID_TABLES,
+    RADII_COVARIANCE_FILE,
+    RADII_TABLES,
     REGISTERS,
     STRAPPING_TABLES,
     SURVEY_TABLES,
@@ -44,7 +47,7 @@ def job_of(raw, log, is_whole=True):
     tables = _read_tables(raw, registers, is_whole, log)
     values = read_settings(raw, log, is_whole) if raw.settings is not None else None
     check_all(values, tables, registers, raw, is_whole, log)
-    attached = _attached(raw, values, tables["points"], log) if is_whole else None
+    attached = _attached(raw, values, tables, log) if is_whole else None
     log.stop_if_problems()
     measurements = None
     if has_survey(tables):
@@ -57,6 +60,7 @@ def job_of(raw, log, is_whole=True):
     tangents = make_tangents(tables, registers)
     clouds = make_clouds(values, tables, registers, raw)
     liquid = make_metering(values, tables, registers, raw)
+    radii, change = make_radii(values, tables, attached.radii_covariance_m2)
     return replace(
         made,
         strapping=strapping,
@@ -65,6 +69,8 @@ def job_of(raw, log, is_whole=True):
         tangents=tangents,
         clouds=clouds,
         liquid=liquid,
+        radii=radii,
+        change=change,
     )
 
 
@@ -78,7 +84,7 @@ def _read_tables(raw, registers, is_whole, log):
     if kind is not None and "points" in allowed:
         allowed += SURVEY_TABLES
     if kind == "vertical":
-        allowed += STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES
+        allowed += STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + RADII_TABLES
     if kind in OF_CLOUDS:
         allowed += CLOUD_TABLES
     tables = {"clouds": _cloud_table(raw, registers, kind, log)}
@@ -125,7 +131,8 @@ def _tell_missing_tables(raw, tables, kind, log):
         _tell_clouds_missing(raw, tables, log)
     for name in REQUIRED_TABLES.get(kind, ()):
         measured = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
-        elsewhere = name == "points" and (measured or is_metered(tables))
+        told = measured or is_metered(tables) or has_radii(tables)
+        elsewhere = name == "points" and told
         if name in raw.tables or elsewhere:
             continue
         if name == "points" and "clouds" in raw.registers:
@@ -165,6 +172,7 @@ _IN_PLACE_OF_POINTS = {
         "no_rows_of_liquid",
         "no rows; expected the start of each run, and a row for each batch and the dip after it",
     ),
+    "radii": message("no_rows_of_radii", "no rows; expected the radius of each course"),
     "circumferences": message(
         "no_circumferences", "no rows; expected a reading of the tape on each course at least"
     ),
@@ -192,15 +200,16 @@ def _missing(raw, name):
     )
 
 
-def _attached(raw, values, points, log):
+def _attached(raw, values, tables, log):
     """What lies beside the settings, None for what cannot be read; values: None: unreadable."""
     mesh = rule = None
     if values is not None:
         mesh, rule = values["mesh"]["file"], values["table"]["rule"]
     return Attached(
-        _covariance(raw, points, log),
+        _covariance(raw, tables["points"], log),
         None if mesh is None else read_mesh_file(raw.folder, mesh, log),
         None if rule is None else find_rule(raw, rule, log),
+        _covariance_of_radii(raw, tables["radii"], log),
     )
 
 
@@ -224,3 +233,24 @@ def _covariance(raw, points, log):
         )
         log.problem(COVARIANCE_FILE, expected)
     return read_covariance(raw.covariance, points.of("point"), log)
+
+
+def _covariance_of_radii(raw, radii, log):
+    """The covariance of the radii, m2, or None: not given, or told to `log`."""
+    if raw.radii_covariance is None:
+        return None
+    if radii is None:
+        if "radii" not in raw.tables or raw.tables["radii"] is not None:  # else it is told already
+            expected = message(
+                "covariance_without_radii",
+                "given without its radii; expected radii.csv beside it",
+            )
+            log.problem(RADII_COVARIANCE_FILE, expected)
+        return None
+    if radii.columns["u_mm"] is not None:
+        expected = message(
+            "covariance_beside_u",
+            "given together with u_mm of the radii; expected only one of them",
+        )
+        log.problem(RADII_COVARIANCE_FILE, expected)
+    return read_covariance(raw.radii_covariance, radii.of("course"), log, OF_RADII)

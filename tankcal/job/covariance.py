@@ -1,25 +1,41 @@
-"""points_cov.npz: the full covariance matrix of the points, read with care.
+"""points_cov.npz and radii_cov.npz: full covariance matrices, read with care.
 
-The archive holds `covariance_m2` (3n, 3n), m2, in the order x, y, z of each point of points.csv,
-and `points` (n,), their names in that order. Nothing in it is ever unpickled.
+An archive holds `covariance_m2`, m2, and the names that it is of, in their order: of points (3n,
+3n), x, y, z of each point of points.csv, and `points` (n,); of radii (n, n), and `courses` (n,).
+Nothing in it is ever unpickled.
 """
 
 import io
 import zipfile
 import zlib
+from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.job.tables import COVARIANCE_FILE, shown
+from tankcal.job.tables import COVARIANCE_FILE, RADII_COVARIANCE_FILE, shown
 from tankcal.messages import message
 
 MAX_POINTS = 2500  # the matrix is 450 MB then
 TOLERANCE = 1e-8  # of a correlation
-_MATRIX, _NAMES = "covariance_m2", "points"
+_MATRIX = "covariance_m2"
 
 
-def read_covariance(data, names, log):
-    """The (3n, 3n) covariance in m2 of the points called `names`, or None after telling `log`."""
+@dataclass(frozen=True)
+class Archive:
+    """A file with a covariance: its name, the array of names, their table, rows of each."""
+
+    file: str
+    names: str
+    table: str
+    each: int
+
+
+OF_POINTS = Archive(COVARIANCE_FILE, "points", "points.csv", 3)
+OF_RADII = Archive(RADII_COVARIANCE_FILE, "courses", "radii.csv", 1)
+
+
+def read_covariance(data, names, log, archive=OF_POINTS):
+    """The covariance in m2 of the points or courses called `names`, or None after telling `log`."""
     if len(names) > MAX_POINTS:
         expected = message(
             "covariance_too_many",
@@ -27,42 +43,56 @@ def read_covariance(data, names, log):
             count=len(names),
             most=MAX_POINTS,
         )
-        log.problem(COVARIANCE_FILE, expected)
+        log.problem(archive.file, expected)
         return None
-    arrays = _load(data, len(names), log)
+    arrays = _load(data, len(names), log, archive)
     if arrays is None:
         return None
-    matrix, its_names = arrays[_MATRIX], arrays[_NAMES]
-    size = 3 * len(names)
-    complaint = _complaint_about_names(its_names, names)
+    matrix, its_names = arrays[_MATRIX], arrays[archive.names]
+    size = archive.each * len(names)
+    complaint = _complaint_about_names(its_names, names, archive)
     if complaint:
-        log.problem(COVARIANCE_FILE, complaint, None, _NAMES)
+        log.problem(archive.file, complaint, None, archive.names)
     if matrix.shape != (size, size) or matrix.dtype.kind != "f":
-        expected = message(
-            "covariance_shape",
-            "found {name} of shape {shape}; expected floating-point numbers of shape {value}: x, "
-            "y, z of {count} points",
-            name=matrix.dtype.name,
-            shape=str(matrix.shape),
-            value=str((size, size)),
-            count=len(names),
-        )
-        log.problem(COVARIANCE_FILE, expected, None, _MATRIX)
+        log.problem(archive.file, _other_shape(matrix, size, archive), None, _MATRIX)
         return None
     matrix = matrix.astype(float)
     complaint = _complaint_about_matrix(matrix)
     if complaint:
-        log.problem(COVARIANCE_FILE, complaint, None, _MATRIX)
+        log.problem(archive.file, complaint, None, _MATRIX)
         return None
     return (matrix + matrix.T) / 2
 
 
-def _load(data, n, log):
+def _other_shape(matrix, size, archive):
+    given = {
+        "name": matrix.dtype.name,
+        "shape": str(matrix.shape),
+        "value": str((size, size)),
+        "count": size // archive.each,
+    }
+    if archive is OF_RADII:
+        return message(
+            "covariance_shape_of_radii",
+            "found {name} of shape {shape}; expected floating-point numbers of shape {value}: the"
+            " radii of {count} courses",
+            **given,
+        )
+    return message(
+        "covariance_shape",
+        "found {name} of shape {shape}; expected floating-point numbers of shape {value}: x, "
+        "y, z of {count} points",
+        **given,
+    )
+
+
+def _load(data, n, log, archive):
     """The two arrays, after a look at what they would unpack to."""
     largest = 8 * (3 * n) ** 2 + 64 * 4 * n + 100_000  # matrix, names of 64 characters, headers
+    wanted = (_MATRIX, archive.names)
     try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            unpacked = sum(member.file_size for member in archive.infolist())
+        with zipfile.ZipFile(io.BytesIO(data)) as zipped:
+            unpacked = sum(member.file_size for member in zipped.infolist())
         if unpacked > largest:
             expected = message(
                 "covariance_unpacks",
@@ -70,51 +100,53 @@ def _load(data, n, log):
                 unpacked=unpacked,
                 n=n,
             )
-            log.problem(COVARIANCE_FILE, expected, None, _MATRIX)
+            log.problem(archive.file, expected, None, _MATRIX)
             return None
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            missing = [name for name in (_MATRIX, _NAMES) if name not in archive.files]
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+            missing = [name for name in wanted if name not in arrays.files]
             for name in missing:
                 log.problem(
-                    COVARIANCE_FILE,
+                    archive.file,
                     message("covariance_array_missing", "missing array"),
                     None,
                     name,
                 )
             if not missing:
-                return {name: archive[name] for name in (_MATRIX, _NAMES)}
+                return {name: arrays[name] for name in wanted}
     except (ValueError, OSError, EOFError, KeyError, TypeError, SyntaxError, MemoryError):
-        _tell_damaged(log)
+        _tell_damaged(log, archive)
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OverflowError):
-        _tell_damaged(log)
+        _tell_damaged(log, archive)
     return None
 
 
-def _tell_damaged(log):
+def _tell_damaged(log, archive):
     expected = message(
         "covariance_damaged",
         "cannot be read; expected a numpy .npz with plain arrays {matrix} and {names}",
         matrix=_MATRIX,
-        names=_NAMES,
+        names=archive.names,
     )
-    log.problem(COVARIANCE_FILE, expected)
+    log.problem(archive.file, expected)
 
 
-def _complaint_about_names(found, names):
+def _complaint_about_names(found, names, archive):
     if found.dtype.kind != "U" or found.shape != (len(names),):
         return message(
             "covariance_names",
-            "expected the {count} names of points.csv as text, in its order",
+            "expected the {count} names of {table} as text, in its order",
             count=len(names),
+            table=archive.table,
         )
     for position, (one, other) in enumerate(zip(found.tolist(), names, strict=True), 1):
         if other is not None and one != other:
             return message(
                 "covariance_other_name",
-                "name {position} is {found}; expected {wanted} as in points.csv",
+                "name {position} is {found}; expected {wanted} as in {table}",
                 position=position,
                 found=shown(one),
                 wanted=shown(other),
+                table=archive.table,
             )
     return None
 

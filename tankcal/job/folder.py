@@ -8,6 +8,7 @@ from tankcal.job.tables import (
     COVARIANCE_FILE,
     MAX_FILE_BYTES,
     MAX_PROBLEMS_PER_FILE,
+    RADII_COVARIANCE_FILE,
     REFUSED_FILE,
     REGISTERS,
     SEPARATORS,
@@ -65,7 +66,10 @@ def read_folder(folder, log):
             if is_readable and settings is None:  # what [csv] says is lost
                 is_readable = _has_plain_heading(data)
             tables[table] = read_csv(name, data, *marks, log) if is_readable else None
-    covariance = content(COVARIANCE_FILE) if COVARIANCE_FILE in names else None
+    covariance, of_radii = (
+        content(name) if name in names else None
+        for name in (COVARIANCE_FILE, RADII_COVARIANCE_FILE)
+    )
     registers = {}
     for register in REGISTERS:
         name = f"{register}.toml"
@@ -82,6 +86,7 @@ def read_folder(folder, log):
         covariance,
         tuple(files),
         registers,
+        of_radii,
     )
 
 

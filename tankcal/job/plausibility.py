@@ -374,6 +374,14 @@ TABLE = (
         ("size_unlike_drawing", "points_unlike_drawing", "points_too_wide"),
     ),
     Plausible(
+        "radius_m of radii.csv",
+        f"{100 * DIAMETER_MISS:g} % + {500 * DIAMETER_MISS_M:g} mm from half of"
+        f" tank.nominal_diameter_m; {100 * IMPOSSIBLE_MISS:g} % is a problem",
+        "diameter for radius, feet",
+        "the drawing",
+        ("radius_unlike_drawing", "radius_impossible", "radius_is_diameter"),
+    ),
+    Plausible(
         "tank.nominal_volume_m3",
         f"{100 * VOLUME_MISS:g} % from the capacity",
         "whatever moves the volume much",

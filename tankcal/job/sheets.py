@@ -5,6 +5,7 @@ from tankcal.job.excel import MAX_FILE_BYTES, Unreadable, read_sheets
 from tankcal.job.grids import placed_columns, table_rows
 from tankcal.job.tables import (
     COVARIANCE_FILE,
+    RADII_COVARIANCE_FILE,
     REGISTERS,
     SETTINGS_SHEET,
     TABLES,
@@ -76,7 +77,7 @@ def _known_sheets(file, found, log):
             )
         elif name in known:
             sheets[name] = sheet
-        elif name == COVARIANCE_FILE.rpartition(".")[0]:
+        elif f"{name}.npz" in (COVARIANCE_FILE, RADII_COVARIANCE_FILE):
             log.problem(
                 sheet_named(name),
                 message("covariance_in_workbook", "a full covariance needs the job as a folder"),

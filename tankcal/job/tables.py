@@ -31,8 +31,9 @@ HITS_TABLES = ("wall_hits", "control_readings")
 TANGENT_TABLES = ("tangents",)
 CLOUD_TABLES = ("scan_targets",)
 LIQUID_TABLES = ("liquid",)
+RADII_TABLES = ("radii",)
 TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + CLOUD_TABLES
-TABLES += LIQUID_TABLES + SURVEY_TABLES
+TABLES += LIQUID_TABLES + RADII_TABLES + SURVEY_TABLES
 REGISTERS = {  # what each lists
     "cameras": "camera",
     "instruments": "instrument",
@@ -43,6 +44,7 @@ SETTINGS_FILE = "job.toml"
 SETTINGS_SHEET = "job"
 REFUSED_FILE = "image_points_refused.csv"  # written beside image_points.csv, never read
 COVARIANCE_FILE = "points_cov.npz"
+RADII_COVARIANCE_FILE = "radii_cov.npz"
 
 MAX_FILE_BYTES = 200_000_000
 MAX_PROBLEMS_PER_FILE = 50
@@ -208,6 +210,7 @@ class RawJob:
     files       (name, SHA-256, bytes) of each file read
     folder      Path of the folder of job.toml or of the workbook
     registers   {"cameras", "instruments", "clouds" or "meters": Register}
+    radii_covariance  bytes of radii_cov.npz, or None
     """
 
     source: str
@@ -219,6 +222,7 @@ class RawJob:
     covariance: bytes | None = None
     files: tuple = field(default=())
     registers: dict = field(default_factory=dict)
+    radii_covariance: bytes | None = None
 
     def file_of(self, table):
         """Name of the table's file or sheet in messages, whether it is there or not."""

@@ -24,6 +24,7 @@ from tankcal.pipeline.liquid_checks import check_liquid_result
 from tankcal.pipeline.liquid_geometry import filled_with
 from tankcal.pipeline.liquid_result import LiquidResult
 from tankcal.pipeline.nominal_wall import NominalWall
+from tankcal.pipeline.radii_wall import RadiiWall
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
@@ -93,6 +94,8 @@ class Result:
         What metered runs say of the tank, beside its geometry.
     nominal : nominal_wall.NominalWall or None
         The wall of the drawing, of an upright tank that only liquid tells.
+    radii : radii_wall.RadiiWall or None
+        The wall of declared radii, with what was measured again in them.
     body : body.Body
         The tank as the sum of its parts, with all corrections that are on.
     zero_m : float
@@ -150,6 +153,7 @@ class Result:
     clouded: Clouded | None = None
     liquid: LiquidResult | None = None
     nominal: NominalWall | None = None
+    radii: RadiiWall | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -210,7 +214,7 @@ class Result:
     @property
     def gross(self) -> ShellVolume | None:
         """The shell as surveyed, without any correction (`volumes.ShellVolume`); else None."""
-        wall = self.wall or self.strapped or self.nominal
+        wall = self.radii or self.wall or self.strapped or self.nominal
         return None if wall is None else shell_volume(wall)
 
     @property
@@ -356,7 +360,8 @@ def _run(job, progress, part_progress, simulated, reading):
         )
     found = find_survey(job, progress, reading=reading)
     job, survey, adjustment = found.job, found.survey, found.adjustment
-    wall = survey if isinstance(survey, Wall) else None
+    radii = survey if isinstance(survey, RadiiWall) else None
+    measured_wall = survey if radii is None else radii.surveyed
     measured = None
     if job.liquid is not None:
         progress(message("adjusting_liquid", "adjusting the runs by liquid with the geometry"))
@@ -376,7 +381,7 @@ def _run(job, progress, part_progress, simulated, reading):
     liquid = measured and measured.result(made.levels_m)
     return Result(
         job=job,
-        wall=wall,
+        wall=measured_wall if isinstance(measured_wall, Wall) else None,
         scan=survey if isinstance(survey, Scan) else None,
         body=body,
         zero_m=zero,
@@ -398,12 +403,13 @@ def _run(job, progress, part_progress, simulated, reading):
             liquid,
         ),
         adjustment=adjustment,
-        strapped=survey if isinstance(survey, StrappedWall) else None,
+        strapped=measured_wall if isinstance(measured_wall, StrappedWall) else None,
         sighting=found.sighting,
         touching=found.touching,
         clouded=found.clouded,
         liquid=liquid,
         nominal=survey if isinstance(survey, NominalWall) else None,
+        radii=radii,
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from tankcal.job import Switches
 from tankcal.messages import Message, message
-from tankcal.pipeline.tanks import body_of, thermal_scale
+from tankcal.pipeline.tanks import as_declared, body_of, thermal_scale
 from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 
 # Named by title and edition alone: the bodies of paid standards were not read, so no clause is.
@@ -41,6 +41,7 @@ def corrections_of(job, survey, over_m=0.0):
     it. The tilt is in the surveyed sections already: its size is what a cut square to the axis
     would lack.
     """
+    job = as_declared(job)
     made, volume = NONE, _at_top(job, survey, NONE, over_m)
     found = []
     reference = volume

@@ -29,10 +29,17 @@ from tankcal.pipeline.wall_readings import (
     off_centre,
     readings_of_offsets,
     readings_of_straps,
+    readings_of_untold,
     settle_readings,
     sites_of,
 )
-from tankcal.pipeline.wall_straps import AreaTerm, Straps, gauged_plates, mean_radii
+from tankcal.pipeline.wall_straps import (
+    AreaTerm,
+    Straps,
+    gauged_plates,
+    mean_radii,
+    told_courses,
+)
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
 
 STATED_BY_STRAPS, STATED_BY_LINES = (), ("mean",)
@@ -149,6 +156,8 @@ def find_strapped_wall(job, progress, amplitudes=None):
         readings += readings_of_offsets(lines, used, courses, insets)
         places += kept
     joints, zero = joints_of(job), shell_zero(job, None)
+    former = readings_of_untold(job, told_courses(job, set()), joints, zero)
+    readings, places = readings + former, places + [-1] * len(former)
     readings, tested, field = _adjusted(
         readings, (joints, zero, nominal), amplitudes, snooping=job.snooping
     )

@@ -14,6 +14,7 @@ from tankcal.messages import message
 from tankcal.pipeline.cross_checks import check_side
 from tankcal.pipeline.survey_limits import limit_at
 from tankcal.pipeline.tape_checks import check_tapes
+from tankcal.pipeline.wall_readings import FORMER
 
 FILE = "circumferences.csv"
 NOMINAL_SHARE = 1 / 500  # of the radius: a course that departs by more from the nominal one
@@ -37,7 +38,7 @@ def check_strapped(job, wall):
         *check_tapes(job, straps),
         *_of_repeats(straps),
         *_of_pairs(job, straps),
-        *_of_courses(job, straps),
+        *(_of_courses(job, straps) if job.radii is None else ()),  # else not all were strapped
         *_of_first_course(job, straps),
         *_uncontrolled(job, wall),
     )
@@ -281,7 +282,8 @@ def _steps(radii_m):
 
 def _uncontrolled(job, wall):
     """Courses of one reading alone: a blunder in it nothing would show."""
-    counts = np.bincount(wall.field.sites.course, minlength=len(job.courses))
+    read = [one.course for one in wall.accepted if one.of != FORMER]
+    counts = np.bincount(read, minlength=len(job.courses))
     alone = [course.name for course, count in zip(job.courses, counts, strict=True) if count == 1]
     if alone:
         yield _problem(

@@ -16,6 +16,8 @@ from tankcal.pipeline.cloud_wall import IN_PROCESS, Clouded, find_wall_in_clouds
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
 from tankcal.pipeline.hit_wall import find_hit_wall
 from tankcal.pipeline.nominal_wall import find_nominal_wall
+from tankcal.pipeline.partial_survey import update_by_survey
+from tankcal.pipeline.radii_wall import RadiiWall, find_radii_wall
 from tankcal.pipeline.scan import Scan, fit_scan
 from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.survey_warnings import refuse_undetermined
@@ -106,6 +108,9 @@ def find_survey(job, progress, amplitudes=None, reading=IN_PROCESS):
         refuse_other_side(job, partial(is_within_wall, survey), adjustment)
     elif adjustment is not None and not is_sighted and isinstance(survey, Scan):
         refuse_other_side(job, survey.is_within, adjustment)
+    if job.radii is not None and not isinstance(survey, RadiiWall):
+        progress(message("updating_radii", "bringing the former radii up to date"))
+        survey = update_by_survey(job, survey)
     return Surveyed(job, survey, adjustment, sighting, touching, clouded)
 
 
@@ -134,6 +139,8 @@ def _survey(job, progress, dof, amplitudes):
     """What was surveyed: a wall of courses, a mesh, the scan of another wall; None: sizes alone."""
     if job.strapping is not None and job.points is None:
         return find_strapped_wall(job, progress, amplitudes)
+    if job.radii is not None and job.points is None:
+        return find_radii_wall(job, progress)
     if job.tank.kind == "vertical" and job.points is None and job.liquid is not None:
         return find_nominal_wall(job, progress)
     if job.tank.kind == "vertical":

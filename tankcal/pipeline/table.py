@@ -14,6 +14,7 @@ from tankcal.pipeline.cloud_wall import Clouded
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
 from tankcal.pipeline.hit_checks import check_hits
 from tankcal.pipeline.line_checks import check_leans, check_lines
+from tankcal.pipeline.radii_wall import RadiiWall
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.strapping_checks import check_strapped, check_straps_beside_points
@@ -146,6 +147,8 @@ def check_table(job, survey, made, sighting=None):
     -------
     tuple of Problem
     """
+    if isinstance(survey, RadiiWall):
+        survey = survey.surveyed
     return (
         *_doubts_of_survey(job, survey, made.top_m),
         *_doubts_of_sights(job, survey, sighting),

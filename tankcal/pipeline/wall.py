@@ -243,6 +243,9 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     by_points = means @ _radii_by_points(sections, len(accepted))
     by_inputs = _by_inputs(job.points, by_points, accepted)
     is_read = job.strapping is not None or job.lines is not None
+    is_read = is_read or (
+        job.radii is not None and len({one.course for one in groups}) < len(job.courses)
+    )
     if is_read or job.points.unbound or by_inputs:
         unbound = unbound_of(job.points, by_points, accepted)
         noise = by_points @ (covariance @ by_points.T)  # between sections, too
@@ -458,7 +461,7 @@ def _refuse_weak(job, groups, height):
             fewest=FEWEST_POINTS,
         )
         for index, course in enumerate(courses)
-        if index not in seen
+        if index not in seen and job.radii is None
     ]
     if problems:
         raise InputError([Problem(origin_of(job.points), text) for text in problems])

@@ -14,6 +14,7 @@ from tankcal.geometry.field.sites import Sites, free_design
 from tankcal.survey.reference_line import level_names
 from tankcal.tank.factors import Factor
 
+FORMER, FORMER_SD_M = "former_radius", 0.01  # of courses that were not measured again
 UNCONTROLLED = 1e-6  # of a reading's variance: what the others leave of it where there are none
 
 
@@ -129,6 +130,26 @@ def readings_of_offsets(given, used, courses, insets_m):
             )
         )
     return found
+
+
+def readings_of_untold(job, told, joints_m, zero_m):
+    """`WallReading`s of courses that a survey beside former radii does not tell: these, in wide
+    doubt, so that there is a wall.
+
+    Each has a free radius of its own, so that they say nothing of the courses that were measured.
+
+    told  indices of the courses that are told
+    """
+    if job.radii is None:
+        return []
+    known = np.where(job.radii.is_known, job.radii.radius_m, job.tank.nominal_diameter_m / 2)
+    return [
+        WallReading(
+            FORMER, i, (joints_m[i] + joints_m[i + 1]) / 2 - zero_m, float(known[i]), FORMER_SD_M
+        )
+        for i in range(len(job.courses))
+        if i not in told
+    ]
 
 
 def off_centre(readings, field):

@@ -23,12 +23,14 @@ from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.tanks import insets_of
 from tankcal.pipeline.untied_setups import Unbound
 from tankcal.pipeline.wall_readings import (
+    FORMER,
     columns_of,
     noise_by_inputs,
     noise_of,
     off_centre,
     readings_of_offsets,
     readings_of_straps,
+    readings_of_untold,
     settle_readings,
     sites_of,
 )
@@ -214,6 +216,9 @@ def join_readings(job, points, amplitudes, joints_m, *, is_known):
         insets = inner if inner.any() else insets_of(job, job.switches)
         offsets, of_offsets = _offsets_of(job.lines, names, insets, points.sites)
         readings, places = readings + offsets, places + of_offsets
+    told = told_courses(job, set(points.sites.course.tolist()))
+    former = readings_of_untold(job, told, joints_m, zero)
+    readings, places = readings + former, places + [-1] * len(former)
     readings = [_on_surface(one, inner[one.course], job.survey.side) for one in readings]
     if not is_known and len(np.unique(points.sites.course)) < len(names):
         amplitudes = None
@@ -254,7 +259,10 @@ def _joined_field(job, points, readings, amplitudes, heights):
     noise = scipy.linalg.block_diag(points.noise_m2, noise_of(readings))
     noise += noise_by_inputs(job.inputs, columns, n + k)
     straps_may = is_bound or _circumferences(job) >= FEWEST_CIRCUMFERENCES
-    may = [job.snooping and (straps_may or one.of == "offsets") for one in readings]
+    may = [
+        job.snooping and one.of != FORMER and (straps_may or one.of == "offsets")
+        for one in readings
+    ]
     may_go = np.append(np.zeros(n), may)
 
     apart = points.unbound.first_apart

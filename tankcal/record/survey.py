@@ -296,6 +296,8 @@ def courses_of(result):
     measured = _of_straps if result.strapped is not None else _of_drawing
     if result.wall is not None:
         measured = partial(_of_sections, _rejected_z_m(result))
+    elif result.radii is not None:
+        measured = _of_radii
     surveyed = surveyed_shell(result)
     for index, (course, shape) in enumerate(
         zip(job.courses, result.body.shell.volume.courses, strict=True)
@@ -365,6 +367,16 @@ def _of_drawing(result, index, shape):
         "points": 0,
         "rejected": 0,
         "radius_m": result.nominal.radius_m[index],
+    }
+
+
+def _of_radii(result, index, shape):
+    """Of a course whose radius was declared."""
+    return {
+        "sections": [],
+        "points": 0,
+        "rejected": 0,
+        "radius_m": result.radii.radius_m[index],
     }
 
 

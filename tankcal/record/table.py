@@ -151,6 +151,7 @@ def choices_of(result):
         **(_shell_choices(job, result) if result.wall is not None else {}),
         **(_strapped_choices(job) if result.strapped is not None else {}),
         **_liquid_choices(result),
+        **_radii_choices(result),
         **({"form": "learned"} if result.scan is not None and job.horizontal is not None else {}),
         "thickness": _thickness_choice(job, result),
         "temperature": _temperature_choice(job),
@@ -260,6 +261,23 @@ def _liquid_choices(result):
     return found
 
 
+def _radii_choices(result):
+    """Where the radii of the courses come from."""
+    if result.radii is None:
+        return {}
+    job = result.job
+    roof = job.roof and job.roof.weighing
+    return {
+        "bottom": _bottom_choice(job),
+        "radii": job.radii.source,
+        "radii_beside": "none" if result.radii.updated is None else "survey",
+        "between_sections": "radii",
+        "tilt": "not_known",
+        "course_heights": "along_axis",
+        "roof": _fitting_choice(job.switches.roof, roof, roof),
+    }
+
+
 def _bottom_choice(job):
     return job.bottom.form if job.switches.bottom else "off"
 
@@ -271,9 +289,17 @@ def _tilt_choice(job, shell):
 
 
 def _temperature_choice(job):
+    if job.radii is not None:
+        return _temperature_of_radii(job)
     if job.survey.shell_temperature_c is None:
         return "not_applied"
     return "applied" if job.switches.temperature else "off"
+
+
+def _temperature_of_radii(job):
+    if job.radii.temperature_c == job.table.reference_temperature_c:
+        return "radii_as_they_are"
+    return "radii_applied" if job.switches.temperature else "off"
 
 
 def _head_choice(job):
@@ -282,7 +308,8 @@ def _head_choice(job):
         return "off"
     if job.table.liquid_density_kg_m3:
         return job.table.liquid_density_kg_m3
-    return "unloaded" if job.survey.liquid_density_kg_m3 else "none"
+    loaded = job.survey.liquid_density_kg_m3 and job.radii is None
+    return "unloaded" if loaded else "none"
 
 
 def _fitting_choice(switched_on, given, applied="declared"):
@@ -301,6 +328,8 @@ def _covariance_choice(job):
 def _thickness_choice(job, result):
     if result.liquid is not None and geometry_beside(result) == "drawing":
         return "drawing"
+    if result.radii is not None:
+        return "radii"
     if job.survey.side == "inside":
         return "inside"
     solid = job.horizontal or job.sphere

@@ -21,6 +21,7 @@ _NOT_IN_ALL = (
     "tangents",
     "clouds",
     "liquid",
+    "radii",
 )
 _PARTS = (
     ("certificate.pdf", "certificate"),

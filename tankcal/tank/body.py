@@ -95,9 +95,6 @@ class ShellPart(Part):
             "shell_temperature": -self.expansion_per_k * by_length,
             "expansion": (self.scale - 1) / self.expansion_per_k * by_length,
         }
-        for name, column in self.read_with.items():
-            by_readings = self.volume.integrated(wet, column[:, None])[:, 0]
-            of_corrections[name] = of_corrections.get(name, 0.0) + by_readings
         found = {
             "scale": by_scale,
             "datum": area,
@@ -107,7 +104,11 @@ class ShellPart(Part):
             "tilt": volume * self.tilt / (1 + self.tilt**2),
             **{name: of_corrections[name] for name in self.bearing},
         }
-        return {name: one for name, one in found.items() if name not in self.unused}
+        found = {name: one for name, one in found.items() if name not in self.unused}
+        for name, column in self.read_with.items():
+            by_readings = self.volume.integrated(wet, column[:, None])[:, 0]
+            found[name] = found.get(name, 0.0) + by_readings
+        return found
 
     def sources(self, levels_m):
         """What the survey itself leaves uncertain: the points, and the form between them."""
@@ -319,6 +320,8 @@ class Body:
         levels = np.linspace(self.lowest_m, self.highest_m, LEVELS)
         moved = self.derivatives(levels)
         known = {one.name for one in self.declared}
+        if self.shell is not None:
+            known.update(self.shell.unused)
         if any(one.kind == OWN_SCALE for part in self.parts for one in part.sources(levels)):
             known.add("scale")
         if any(part.has_own_height for part in self.parts):

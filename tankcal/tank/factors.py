@@ -32,6 +32,10 @@ class Factor:
     note: str = ""
     is_default: bool = False
 
+    def mapped(self, function):
+        """The same cause over something else: function(columns) -> columns."""
+        return replace(self, columns=function(self.columns))
+
     def source(self, columns_m3):
         """The `Source` of (rows, c) columns that its own columns make in a table."""
         return Source(

@@ -166,6 +166,8 @@ def test_empty_form_reports_only_what_is_missing(tmp_path, kind, survey, languag
         empty["sheet clouds"] = empty.pop("sheet points") and "nothing filled in"
     if survey == "liquid" and kind == "vertical":
         empty["sheet liquid"] = empty.pop("sheet points") and "no rows"
+    if survey == "radii":
+        empty["sheet radii"] = empty.pop("sheet points") and "no rows"
     assert others == empty
 
 

@@ -25,7 +25,7 @@ from tankcal.job.contract import (
 from tankcal.job.fields import Field
 from tankcal.job.rule_files import LIMITS, RULE, parse_rule, shipped_names
 from tankcal.job.starter import write_starter
-from tankcal.job.starter.form import METERED, STRAPPED
+from tankcal.job.starter.form import DECLARED, METERED, STRAPPED
 from tankcal.job.starter.page import filled_page
 from tankcal.job.tables import Log
 from tankcal.tank.rules import TANKS
@@ -33,6 +33,7 @@ from tankcal.text.languages import DEFAULT, LANGUAGES
 
 OTHERS = [one for one in LANGUAGES if one != DEFAULT]
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "job-format.md"
+OF_SURVEYS = ("shell", "strapping", "liquid", "radii", "change")
 BLANKS = [
     "tank.id",
     "tank.nominal_diameter_m",
@@ -68,7 +69,7 @@ def assert_written(starter, kind):
     assert f'\nkind = "{kind}"' in text
     settings = tomllib.loads(text)
     for section, fields in KEYS.items():
-        strapped = section in ("shell", "strapping", "liquid")  # of forms of surveys alone
+        strapped = section in OF_SURVEYS  # of forms of surveys alone
         suiting = [
             field for field in fields if field.suits(kind) and not field.of_survey and not strapped
         ]
@@ -95,7 +96,7 @@ def test_a_starter_for_a_survey(tmp_path, survey):
     write_starter(tmp_path / "starter", survey=survey)
     starter = tmp_path / "starter"
     tables = [*SURVEYS[survey], *TABLES_OF_KIND["vertical"][1:]]
-    registers = REGISTERS_OF_SURVEY[survey]
+    registers = REGISTERS_OF_SURVEY.get(survey, ())
     names = ["job.toml", "job.xlsx", *(f"{table}.csv" for table in tables)]
     names += [f"{register}.toml" for register in registers]
     assert sorted(path.name for path in starter.iterdir()) == sorted(names)
@@ -103,6 +104,9 @@ def test_a_starter_for_a_survey(tmp_path, survey):
     if survey in STRAPPED:
         assert "adjustment" not in settings
         assert settings["shell"] == {"shape_sd_mm": ""}
+    elif survey == DECLARED:
+        assert "adjustment" not in settings
+        assert list(settings["radii"]) == [field.name for field in KEYS["radii"]]
     elif survey == METERED:
         assert "adjustment" not in settings
         assert list(settings["liquid"]) == [field.name for field in KEYS["liquid"]]
@@ -133,6 +137,7 @@ def test_empty_survey_is_reported_as_missing(tmp_path, survey, name):
         load(tmp_path / "starter" / name)
     told = [problem for problem in caught.value.problems if problem.column not in BLANKS]
     own = {"wall-hits": "wall_hits", "tangents": "tangents", "cloud": "clouds", "liquid": "liquid"}
+    own["radii"] = "radii"
     measured = own.get(survey, "points")
     expected = ["courses", "circumferences" if survey in STRAPPED else measured]
     found = sorted(problem.file.split()[-1].partition(".")[0] for problem in told)

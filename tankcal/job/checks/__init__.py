@@ -10,6 +10,7 @@ from tankcal.job.checks.clouds import check_clouds
 from tankcal.job.checks.extent import (
     Extent,
     extent_of,
+    has_radii,
     has_survey,
     has_wall_points,
     is_metered,
@@ -21,6 +22,7 @@ from tankcal.job.checks.hits import check_hits
 from tankcal.job.checks.lines import check_lines
 from tankcal.job.checks.liquid import check_liquid
 from tankcal.job.checks.plausible import check_metering, check_plausible
+from tankcal.job.checks.radii import check_radii
 from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.strapping import check_strapping
 from tankcal.job.checks.survey import check_survey
@@ -51,6 +53,7 @@ def check_all(values, tables, registers, raw, is_whole, log):
     if is_whole:
         check_tank(values, tables, raw, log)
         if kind_of(raw) == "vertical":
+            check_radii(values, tables, raw, log)
             check_strapping(values, tables, registers, raw, log)
             check_lines(values, tables, registers, raw, log)
             check_hits(values, tables, registers, raw, log)
@@ -72,7 +75,8 @@ def check_tank(values, tables, raw, log):
         check_settings(values, tables, extent, kind, raw, log)
         check_plausible(values, tables, extent, kind, raw, log)
     elsewhere = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
-    needs_points = kind == "vertical" and not (elsewhere or is_metered(tables))
+    told = elsewhere or is_metered(tables) or has_radii(tables)
+    needs_points = kind == "vertical" and not told
     if points is not None and (needs_points or has_rows(points)):
         check_points(points, log)
     if values is not None:

@@ -3,6 +3,7 @@
 from tankcal.job.checks.extent import (
     has_clouds,
     has_hits,
+    has_radii_alone,
     has_wall_points,
     is_metered_alone,
     is_strapped,
@@ -28,9 +29,10 @@ def useless_inputs(values, tables, kind):
         for name, known in INPUTS.items()
         if kind not in known.kinds
     }
-    rules = _of_temperature(values) | {"deadwood": _of_deadwood(values, tables["deadwood"])}
+    rules = _of_temperature(values, tables) | {"deadwood": _of_deadwood(values, tables["deadwood"])}
     if kind == "vertical":
         rules |= _of_vertical(values, tables)
+        rules |= _of_radii() if has_radii_alone(tables) else {}
     elif kind == "horizontal":
         rules |= _of_horizontal(values, has_wall_points(tables))
     elif kind == "sphere":
@@ -42,9 +44,11 @@ def _switched_off(correction):
     return message("switched_off", "corrections.{correction} is false", correction=correction)
 
 
-def _of_temperature(values):
+def _of_temperature(values, tables):
     """{input: "" or why it has no effect}; so do all below."""
     given = values["survey"]["shell_temperature_c"] is not None
+    if has_radii_alone(tables):
+        given = values["radii"]["reference_temperature_c"] is not None
     expands = given and values["corrections"]["temperature"] is not False
     why = (
         ""
@@ -99,6 +103,17 @@ def _of_vertical(values, tables):
     }
 
 
+def _of_radii():
+    """What a survey has, and radii that were declared have not."""
+    why = message(
+        "radii_are_inside",
+        "expected only with a survey: the radii are those of the empty shell, inside, with their"
+        " own uncertainty",
+    )
+    of_survey = ("scale", "offset", "tilt", "paint", "shell_temperature", "survey_level")
+    return dict.fromkeys((*of_survey, "survey_density"), why)
+
+
 def _has_own_offset(tables):
     """Is what the wall was measured by free of an offset that all radii share?"""
     return (
@@ -129,7 +144,7 @@ def _of_plates(values, tables, is_loaded):
     """
     switches, courses = values["corrections"], tables["courses"]
     seen = is_strapped(tables) or may_be_hit_from_both_sides(tables)
-    inside = values["survey"]["side"] == "inside" and not seen
+    inside = (values["survey"]["side"] == "inside" and not seen) or has_radii_alone(tables)
     why = {"plate_thickness": "", "paint": ""}
     if (inside or switches["plate"] is False) and not is_loaded:
         why["plate_thickness"] = NOT_SUBTRACTED

@@ -45,9 +45,24 @@ def is_metered(tables):
     return has_rows(tables.get("liquid"))
 
 
+def has_radii(tables):
+    """Are there radii of a former table, a record or a declaration?"""
+    return has_rows(tables.get("radii"))
+
+
+def is_surveyed(tables):
+    """Did somebody measure the wall of an upright tank, or some courses of it?"""
+    return has_wall_points(tables) or is_strapped(tables)
+
+
+def has_radii_alone(tables):
+    """Is nothing but declared radii known of the wall?"""
+    return has_radii(tables) and not is_surveyed(tables)
+
+
 def is_metered_alone(tables):
     """Is liquid all that tells the tank, beside the sizes of its drawing?"""
-    return is_metered(tables) and not (has_wall_points(tables) or is_strapped(tables))
+    return is_metered(tables) and not is_surveyed(tables)
 
 
 def is_sighted(tables):

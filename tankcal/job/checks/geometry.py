@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.job.checking import UNIT_FACTOR, course_heights, places_of, tell
+from tankcal.job.checks.extent import has_radii
 from tankcal.messages import message
 from tankcal.survey.reference_line import courses_told
 
@@ -143,8 +144,9 @@ def _check_points_in_courses(z, unplaced, edges, tables, raw, log):
     names = np.array(courses.of("course"))
     seen = set(names[counts + unplaced >= MIN_POINTS_PER_COURSE].tolist())
     told = courses_told(seen, _courses_of(tables["circumferences"]), _courses_of(tables["offsets"]))
+    known = has_radii(tables)  # of those that were not measured again
     for row, name, count in zip(courses.rows, courses.of("course"), counts, strict=True):
-        if name in told - seen and not count:
+        if (name in told - seen or known) and not count:
             continue
         if count + unplaced < MIN_POINTS_PER_COURSE:
             expected = message(

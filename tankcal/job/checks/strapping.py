@@ -9,7 +9,7 @@ from tankcal.job.checking import (
     tell,
     temperature_missing,
 )
-from tankcal.job.checks.extent import has_wall_points, is_strapped
+from tankcal.job.checks.extent import has_radii, has_wall_points, is_strapped
 from tankcal.job.checks.spans import check_spans
 from tankcal.job.contract.observations import READINGS
 from tankcal.job.contract.registers import FREE
@@ -44,7 +44,8 @@ def check_strapping(values, tables, registers, raw, log):
     courses = tables["courses"]
     known = () if courses is None else tuple(courses.of("course"))
     alone = _stands_alone(tables, raw)
-    _check_courses(straps, tables, courses, known, alone, log)
+    every = alone and not has_radii(tables) and raw.tables.get("radii", ()) is not None
+    _check_courses(straps, tables, courses, known, every, log)
     _check_tapes(straps, registers["instruments"], tapes, raw, log)
     _check_obstructions(tables["obstructions"], set(straps.of("circumference")), log)
     if has_rows(tables["obstructions"]):
@@ -89,7 +90,8 @@ def _tell_without_effect(tables, log):
             log.warning(tables[name].file, expected)
 
 
-def _check_courses(straps, tables, courses, known, alone, log):
+def _check_courses(straps, tables, courses, known, every, log):
+    """every: whether each course needs a circumference."""
     refuse_others(straps, "course", known, log)
     reached = {
         course
@@ -101,7 +103,7 @@ def _check_courses(straps, tables, courses, known, alone, log):
     if straps.skipped or courses is None or courses.skipped or None in reached:
         return
     for row, name in zip(courses.rows, known, strict=True):
-        if name is not None and name not in reached and alone:
+        if name is not None and name not in reached and every:
             expected = message(
                 "course_not_strapped",
                 "no circumference was measured on course {course!r}; expected one at least in"

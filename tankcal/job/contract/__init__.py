@@ -14,6 +14,7 @@ from tankcal.job.contract import (
     lines,
     liquid,
     points,
+    radii,
     roof,
     stadia,
     stated,
@@ -34,15 +35,16 @@ from tankcal.text.form_words import NOTES
 
 SECTIONS = (
     *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "bottom", "roof"),
-    *("shell", "strapping", "liquid", "corrections", "material", "checks"),
+    *("shell", "strapping", "liquid", "radii", "change"),
+    *("corrections", "material", "checks"),
     *("adjustment", "adjustment.camera", "certificate"),
     "csv",
 )
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES}
 COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | tangents.COLUMNS | stadia.COLUMNS
-COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | SURVEY_COLUMNS
-_KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS
+COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS | SURVEY_COLUMNS
+_KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS | radii.KEYS
 _KEYS |= {"bottom": bottom.KEYS, "roof": roof.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
 
@@ -54,6 +56,7 @@ SURVEYS = ADJUSTED_SURVEYS | {
     "tangents": (*tangents.COLUMNS, *tangents.BESIDE),
     "cloud": (*clouds.COLUMNS, *clouds.BESIDE),
     "liquid": tuple(liquid.COLUMNS),
+    "radii": tuple(radii.COLUMNS),
 }
 
 REQUIRED_TABLES = {"vertical": ("points", "courses")}

@@ -14,6 +14,7 @@ from tankcal.job.model.parts import (
     Roof,
     Sphere,
 )
+from tankcal.job.model.radii import Change, Radii
 from tankcal.job.model.settings import (
     Datum,
     DeclaredInput,
@@ -34,6 +35,7 @@ from tankcal.tank.rules.model import Rule
 
 __all__ = [
     "Bottom",
+    "Change",
     "Course",
     "Datum",
     "Deadwood",
@@ -47,6 +49,7 @@ __all__ = [
     "Meter",
     "Metering",
     "Points",
+    "Radii",
     "Roof",
     "Sphere",
     "StatedVolume",
@@ -115,6 +118,11 @@ class Job:
         Files of scanners, in place of points.
     liquid : Metering or None
         Runs of metered liquid, beside a survey or alone.
+    radii : Radii or None
+        Of the courses, by a former table, a record or a declaration; alone, or beside a survey of
+        some courses.
+    change : Change or None
+        How they may have changed since then; beside a survey.
     """
 
     tank: Tank | None
@@ -150,3 +158,5 @@ class Job:
     tangents: Tangents | None = None
     clouds: Clouds | None = None
     liquid: Metering | None = None
+    radii: Radii | None = None
+    change: Change | None = None

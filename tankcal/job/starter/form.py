@@ -11,13 +11,15 @@ from tankcal.job.contract import (
     SURVEYS,
     TABLES_OF_KIND,
 )
+from tankcal.job.contract.radii import KEYS as OF_RADII
 from tankcal.job.contract.uncertainty import UNITS
 from tankcal.job.fields import Field
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
 STRAPPED = ("strapping", "reference-line")  # surveys that are not adjusted as points
 METERED = "liquid"  # a survey of every kind of tank
-OF_SHELLS = (*STRAPPED, "wall-hits", "tangents")  # surveys of upright tanks alone
+DECLARED = "radii"  # no survey, but what a former table, a record or somebody says
+OF_SHELLS = (*STRAPPED, "wall-hits", "tangents", DECLARED)  # surveys of upright tanks alone
 STARTS_OF_STRAPPING = {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
 STARTS_OF_LIQUID = {"survey.side": "inside", "datum.bottom_z_m": "0.0"}  # of upright tanks
 PLACEHOLDER = "NAME"  # of a camera or an instrument
@@ -78,7 +80,7 @@ class Form:
             return self.language
         if self.survey == "tangents" and (section, field.name) == ("survey", "side"):
             return "outside"
-        if self.survey == METERED and self.kind == "vertical":
+        if self.survey in (METERED, DECLARED) and self.kind == "vertical":
             return STARTS_OF_LIQUID.get(f"{section}.{field.name}", field.start)
         if self.survey in STRAPPED:
             return STARTS_OF_STRAPPING.get(f"{section}.{field.name}", field.start)
@@ -116,9 +118,11 @@ class Form:
             return False
         if section in ("shell", "strapping") and self.survey not in STRAPPED:
             return False
-        if section.startswith("adjustment") and self.survey in (*STRAPPED, METERED):
+        if section.startswith("adjustment") and self.survey in (*STRAPPED, METERED, DECLARED):
             return False
         if section == METERED and self.survey != METERED:
+            return False
+        if section in OF_RADII and self.survey != DECLARED:
             return False
         of_photos = section == "adjustment.camera" or field.name in OF_PHOTOS
         return field.suits(self.kind) and (self.survey == "photos" or not of_photos)

@@ -74,6 +74,8 @@ SECTION_NOTES = {
     "shell": "how far the wall is from a circle",
     "strapping": "how the tape lay",
     "liquid": "the liquid that was metered into the tank, and how well its dips were read",
+    "radii": "the radii of radii.csv: where they come from, and how well they are known",
+    "change": "only beside a new survey of some courses: how far the radii may have changed since",
     "checks": "only compared, to tell a slip of the hand: nothing here changes a number",
     "adjustment": "how bad points are treated, and what holds the frame of a survey",
     "adjustment.camera": "what of the cameras is adjusted: off, camera free, camera weighted,"
@@ -118,6 +120,7 @@ TABLE_NOTES = {
     "stadia": "one row for each reading of a stadia bar from a set-up; may stay empty",
     "scan_targets": "one row for each target in each scan; may stay empty",
     "liquid": "one row for the start of each run, and one for each batch with the dip after it",
+    "radii": "one row for each course, with its radius as a former table or a record has it",
     "tangents": "one row for each sight to a limb of the tank, from outside",
     "wall_hits": "one row for each sight to the bare wall, without a target",
     "control_readings": "one row for each reading of a control target: at the start, every half"

@@ -1,6 +1,6 @@
 """From a checked job to the body of its tank: every part, with the corrections that are on."""
 
-from tankcal.pipeline.tanks.common import thermal_scale
+from tankcal.pipeline.tanks.common import as_declared, thermal_scale
 from tankcal.pipeline.tanks.solid import sized_job, solid_body, solid_zero
 from tankcal.pipeline.tanks.vertical import (
     critical_zone,
@@ -11,6 +11,7 @@ from tankcal.pipeline.tanks.vertical import (
 )
 
 __all__ = [
+    "as_declared",
     "body_of",
     "critical_zone",
     "insets_of",

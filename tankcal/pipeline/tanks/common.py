@@ -1,5 +1,7 @@
 """What tanks of every kind have: estimates of their inputs, deadwood, and a temperature."""
 
+from dataclasses import replace
+
 from tankcal.tank.fittings import deadwood
 
 LEARNED, HALF_LEARNED = 0.1, 0.5  # share of a variance's logarithm that is assumed, at most
@@ -74,6 +76,26 @@ def deadwood_part(items, zero_m):
         [item.volume_m3 for item in items],
         [item.u_m3 for item in items],
     )
+
+
+def as_declared(job):
+    """A job of declared radii as these are: inside, the shell empty, at their temperature.
+
+    Any other job as it is. What was surveyed beside the radii is in them already.
+    """
+    if job.radii is None:
+        return job
+    temperature = job.radii.temperature_c
+    if temperature == job.table.reference_temperature_c:
+        temperature = None
+    survey = replace(
+        job.survey,
+        side="inside",
+        shell_temperature_c=temperature,
+        liquid_level_m=None,
+        liquid_density_kg_m3=None,
+    )
+    return replace(job, survey=survey)
 
 
 def thermal_scale(job, switches):

@@ -9,6 +9,7 @@ from tankcal.geometry.field.estimate import gauss_heights
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.job.contract.bottom import OF_CLOUD
 from tankcal.pipeline.tanks.common import (
+    as_declared,
     deadwood_part,
     estimates_of,
     is_warmed,
@@ -157,6 +158,7 @@ def critical_zone(job):
 
 
 def vertical_body(job, wall, switches, uncertain):
+    job = as_declared(job)
     shell = _shell(job, wall, switches, uncertain)
     zero = shell_zero(job, wall)
     parts = [shell]
@@ -254,15 +256,19 @@ def _shell(job, wall, switches, uncertain):
         departures=_declared(job),
     )
     features = _functionals(wall, volume) if uncertain else None
+    bearing = _bearing(job, switches)
+    read_with = wall.read_with(features.weights) if uncertain else {}
+    if job.radii is None:  # else all that a survey beside them depends on is in the radii
+        read_with = {name: column for name, column in read_with.items() if name in bearing}
     return ShellPart(
         volume,
         _factors(job, wall, volume, features) if uncertain else (),
         scale,
         job.material.expansion_per_k,
         stretch,
-        _bearing(job, switches),
+        bearing,
         wall.shell.tilt if switches.tilt else 0.0,
-        wall.read_with(features.weights) if uncertain else {},
+        read_with,
         wall.without_inputs,
         job.survey.side == "outside",
     )

@@ -6,6 +6,7 @@ Each set of facts is a `Table` of one row. `Column.key` is the label of the fact
 
 from tankcal.report.dip_point import dip_point_text
 from tankcal.report.metered_liquid import metered_liquid_text
+from tankcal.report.radii_source import source_text
 from tankcal.report.tables.table import Column, Table
 from tankcal.text.words import method_line
 
@@ -137,8 +138,16 @@ REFERENCES = Table(
 )  # fmt: skip
 
 
+def _radii(paper, row):
+    """Where former radii come from."""
+    return source_text(paper) if paper.record.get("radii") else None
+
+
 def _survey(record):
     survey = record["job"]["survey"]
+    radii = record.get("radii")
+    if radii and not radii["change"]:  # nothing was surveyed: the date is that of the radii
+        return [{"survey_date": survey["date"]}]
     return [
         {
             "survey_date": survey["date"],
@@ -158,6 +167,7 @@ SURVEY = Table(
     "survey",
     (
         Column("survey_method", text=_method, sheet=True),
+        Column("radii_source", text=_radii, sheet=True),
         Column("scanned", text=_scanned, sheet=True),
         Column("metered", text=_metered, sheet=True),
         Column("metered_liquid", text=_metered_liquid, sheet=True),

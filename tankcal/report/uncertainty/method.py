@@ -44,6 +44,12 @@ FROM_SURVEY = (
     "below_first_dip",
     "nominal_radius",
     "nominal_radius_of_all",
+    "course_radii",
+    "course_radii_common",
+    "course_radii_shared",
+    "radii_change",
+    "radii_change_common",
+    "measured_form",
 )
 OF_READING = ("interpolation", "rounding")
 

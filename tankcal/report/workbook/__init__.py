@@ -17,6 +17,7 @@ from tankcal.report.workbook.papers import (
     lines_sheet,
     liquid_sheet,
     provenance_sheet,
+    radii_sheet,
     strapping_sheet,
     tangents_sheet,
 )
@@ -56,6 +57,7 @@ _OF_SURVEYS = {  # sheets of what a wall was surveyed with, by the part of the r
     "tangents": tangents_sheet,
     "clouds": clouds_sheet,
     "liquid": liquid_sheet,
+    "radii": radii_sheet,
 }
 _SHOWN_OF_SURVEY = ("adjustment", "points", "provenance")
 

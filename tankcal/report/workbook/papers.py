@@ -1,6 +1,6 @@
 """The working papers: courses, corrections, choices and provenance."""
 
-from tankcal.report.tables import clouds, hits, lines, liquid, strapping, tangents, tank
+from tankcal.report.tables import clouds, hits, lines, liquid, radii, strapping, tangents, tank
 from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
@@ -103,6 +103,14 @@ def liquid_sheet(book, record):
             if table.rows(record)
         ]
         write_tables(book, sheet, _HEAD_ROW, tables)
+
+
+def radii_sheet(book, record):
+    """Courses by their radii: former, found, and as they are in the table."""
+    sheet = book.sheet("radii", book.word("texts.radii_subtitle"), landscape=True)
+    heading = book.word("headings.radii")
+    columns = columns_of(book, radii.RADII)
+    write_tables(book, sheet, _HEAD_ROW, [(heading, "radii", columns)])
 
 
 def corrections_sheet(book, record):

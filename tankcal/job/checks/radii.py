@@ -1,0 +1,146 @@
+"""Do declared radii make sense as a whole? Courses, sizes, and what a new survey needs beside."""
+
+from tankcal.job.checking import is_not_given, missing_beside, refuse_repeated, tell
+from tankcal.job.checks.extent import has_radii, is_metered, is_surveyed
+from tankcal.job.checks.strapping import refuse_others
+from tankcal.job.contract.radii import KEYS, NEEDED, NEEDED_OF_CHANGE
+from tankcal.job.plausibility import DIAMETER_MISS, DIAMETER_MISS_M, IMPOSSIBLE_MISS
+from tankcal.messages import message
+
+DIAMETER = (1.8, 2.2)  # of the nominal radius: what was given is a diameter
+
+
+def check_radii(values, tables, raw, log):
+    """Each course once, radii of the drawing's size, and the settings that are needed."""
+    if not has_radii(tables):
+        _tell_without_rows(raw, log)
+        return
+    table, courses = tables["radii"], tables["courses"]
+    refuse_repeated(table, "course", log)
+    known = () if courses is None else tuple(courses.of("course"))
+    refuse_others(table, "course", known, log)
+    if not is_surveyed(tables) and not _has_unreadable_survey(raw):
+        _refuse_gaps(table, courses, log)
+    if is_metered(tables):
+        expected = message(
+            "radii_beside_liquid",
+            "given beside {file}; expected only one of them",
+            file=tables["liquid"].file,
+        )
+        log.problem(table.file, expected)
+    if values is not None:
+        _check_sizes(table, values["tank"]["nominal_diameter_m"], log)
+        _check_settings(values, tables, raw, log)
+
+
+def _tell_without_rows(raw, log):
+    if raw.tables.get("radii", ()) is None:
+        return  # unreadable: it is told already
+    for section in KEYS:
+        for key in _given(raw, section)[:1]:
+            expected = message(
+                "settings_without_radii",
+                "given without {file}; expected both or none",
+                file=raw.file_of("radii"),
+            )
+            tell(log.problem, raw, section, key, expected)
+
+
+def _given(raw, section):
+    entries = (raw.settings or {}).get(section, {})
+    return [key for key in entries if not is_not_given(raw, section, key)]
+
+
+def _has_unreadable_survey(raw):
+    return any(table is None for name, table in raw.tables.items() if name != "radii")
+
+
+def _refuse_gaps(table, courses, log):
+    """Where nothing was measured again every course needs its radius."""
+    blank = message(
+        "radius_missing", "blank; expected the radius of the course: no survey measures it"
+    )
+    for row, radius in zip(table.rows, table.of("radius_m"), strict=True):
+        if radius is None and not log.has(table.file, row, "radius_m"):
+            log.problem(table.file, blank, row, "radius_m")
+    if courses is None or courses.skipped or table.skipped:
+        return
+    for name in courses.of("course"):
+        if name is not None and name not in table.of("course"):
+            expected = message(
+                "course_without_radius",
+                "no row for course {course!r}; expected its radius: no survey measures it",
+                course=name,
+            )
+            log.problem(table.file, expected, None, "course")
+
+
+def _check_sizes(table, diameter_m, log):
+    """Radii against half of the drawing's diameter."""
+    if diameter_m is None:
+        return
+    nominal = diameter_m / 2
+    for row, radius in zip(table.rows, table.of("radius_m"), strict=True):
+        if radius is None or abs(radius - nominal) <= DIAMETER_MISS * nominal + DIAMETER_MISS_M / 2:
+            continue
+        ratio, sizes = radius / nominal, {"radius_m": radius, "nominal_m": nominal}
+        if DIAMETER[0] < ratio < DIAMETER[1]:
+            expected = message(
+                "radius_is_diameter",
+                "found {radius_m:g} m; expected about {nominal_m:g} m, half of"
+                " tank.nominal_diameter_m: is it a diameter?",
+                **sizes,
+            )
+            log.problem(table.file, expected, row, "radius_m")
+        elif not 1 / (1 + IMPOSSIBLE_MISS) <= ratio <= 1 + IMPOSSIBLE_MISS:
+            expected = message(
+                "radius_impossible",
+                "found {radius_m:g} m; expected about {nominal_m:g} m, half of"
+                " tank.nominal_diameter_m: is one of them in another unit?",
+                **sizes,
+            )
+            log.problem(table.file, expected, row, "radius_m")
+        else:
+            expected = message(
+                "radius_unlike_drawing",
+                "{radius_m:g} m, half of tank.nominal_diameter_m is {nominal_m:g} m: they differ by"
+                " {percent:+.2f} %",
+                percent=100 * (ratio - 1),
+                **sizes,
+            )
+            log.warning(table.file, expected, row, "radius_m")
+
+
+def _check_settings(values, tables, raw, log):
+    def refuse(section, key, expected):
+        tell(log.problem, raw, section, key, expected)
+
+    for key in NEEDED:
+        if is_not_given(raw, "radii", key):
+            refuse("radii", key, missing_beside(tables["radii"].file))
+    change = values["change"]
+    if not is_surveyed(tables):
+        expected = message(
+            "change_without_survey",
+            "given without a survey; expected one of some courses beside the former radii",
+        )
+        for key in () if _has_unreadable_survey(raw) else _given(raw, "change"):
+            refuse("change", key, expected)
+        return
+    expected = message(
+        "change_missing",
+        "missing; expected how far the radii may have changed since they were measured: what the"
+        " courses get that nobody measured again hangs on it",
+    )
+    for key in NEEDED_OF_CHANGE:
+        if is_not_given(raw, "change", key):
+            refuse("change", key, expected)
+    shared, common = change["shared_mm"], values["radii"]["u_common_mm"]
+    if None not in (shared, common) and shared > common:
+        expected = message(
+            "shared_too_large",
+            "found {shared:g}; expected at most radii.u_common_mm = {common:g}: it is a part of it",
+            shared=shared,
+            common=common,
+        )
+        refuse("change", "shared_mm", expected)

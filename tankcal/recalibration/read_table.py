@@ -1,0 +1,319 @@
+"""From a former table and its courses to what it says of its tank: the checks, and the dispatch."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+from tankcal.job.tables import Log
+from tankcal.messages import message
+from tankcal.recalibration.read_courses import read_courses
+from tankcal.recalibration.reading import read_former
+from tankcal.recalibration.recorded_radii import read_recorded
+from tankcal.recalibration.rounding import sd_of_rows
+from tankcal.recalibration.seams import find_seams
+from tankcal.recalibration.solid_geometry import fit_lying, fit_sphere
+from tankcal.recalibration.table_job import job_of_geometry, job_of_record, job_of_solid
+from tankcal.recalibration.upright_geometry import STEEL_PA, read_upright
+
+FEWEST_ROWS = 8
+SOLIDS = "horizontal", "sphere"
+ABOVE_M = 0.02  # that a table may go beyond its courses
+LARGE_SHARE = 2e-3  # of the table, that a thing which may be a roof takes
+
+
+@dataclass(frozen=True)
+class TableRead:
+    """What was read.
+
+    Attributes
+    ----------
+    former : FormerTable
+    geometry : UprightGeometry, RecordedRadii, LyingGeometry or SolidFit
+    names : tuple of str
+        Of the courses.
+    job : JobOfTable
+    warnings : tuple of Message
+    """
+
+    former: object
+    geometry: object
+    names: tuple[str, ...]
+    job: object
+    warnings: tuple
+
+
+def read_table(
+    path, courses_path=None, former_toml=None, *, kind=None, e_pa=STEEL_PA, bottom_m=None
+):
+    """Read the geometry of a tank out of a former table.
+
+    Parameters
+    ----------
+    path : path
+        The table; a record.json gives the radii that it has.
+    courses_path : path or None
+        courses.csv: course, height_m (blank: the seams are found), thickness_mm; None for a
+        record, a lying tank and a sphere.
+    former_toml : path or None
+        What else is known of the table.
+    kind : {"vertical", "horizontal", "sphere"} or None
+        None: as former.toml or the record says, else upright.
+    e_pa : float
+        Young's modulus of the shell.
+    bottom_m : float or None
+        Dip of the highest point of the bottom; None: found.
+
+    Returns
+    -------
+    TableRead
+
+    Raises
+    ------
+    InputError
+        With every problem of table and courses.
+    SolutionError
+        When the table does not determine its tank.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from tankcal.recalibration.read_table import read_table
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     table, courses = Path(folder, "old.csv"), Path(folder, "courses.csv")
+    ...     rows = [f"{dip / 100:.2f},{np.pi * 36 * dip / 100:.3f}" for dip in range(301)]
+    ...     size = table.write_text("\\n".join(["height_m,volume_m3", *rows]))
+    ...     size = courses.write_text("course,height_m,thickness_mm\\n1,1.5,8\\n2,1.5,6\\n")
+    ...     read = read_table(table, courses)
+    >>> read.geometry.radii_m.round(4).tolist(), read.geometry.head
+    ([6.0, 6.0], 'without')
+    """
+    log = Log()
+    former = _former(path, former_toml, log)
+    kind = kind or (former.kind if former else None) or "vertical"
+    if former is not None and kind in SOLIDS:
+        log.stop_if_problems()
+        return _read_solid(former, kind)
+    if former is not None and former.record is not None:
+        log.stop_if_problems()
+        radii = read_recorded(former)
+        job = job_of_record(former, radii, tank_id=_tank_of(former))
+        return TableRead(former, radii, radii.names, job, tuple(_of_job(former, 0.0)))
+    courses = None
+    if courses_path is None:
+        expected = message("read_no_courses_file", "missing; expected --courses courses.csv")
+        log.problem("--courses", expected)
+    else:
+        courses = read_courses(courses_path, log)
+    if former is not None:
+        _check_kind(former, kind, log)
+    log.stop_if_problems()
+    courses, warnings, seams_known = _fitting(former, courses)
+    return _read(former, courses, warnings, e_pa, bottom_m, seams_known)
+
+
+def _former(path, former_toml, log):
+    try:
+        return read_former(path, former_toml)
+    except InputError as error:
+        log.problems += error.problems
+        return None
+
+
+def _read_solid(former, kind):
+    found = fit_sphere(former) if kind == "sphere" else fit_lying(former)
+    fit = found if kind == "sphere" else found.best
+    job = job_of_solid(former, fit, tank_id=_tank_of(former))
+    return TableRead(former, found, (), job, (*_of_solid(found), *_of_job(former, 0.0)))
+
+
+def _of_solid(found):
+    fit = getattr(found, "best", found)
+    if fit.variance_factor > 1:
+        yield message(
+            "read_rough_solid",
+            "the rows depart by {rms:.3g} L (rms) from such a tank, more than rounding leaves; u "
+            "is by what they leave",
+            rms=1000 * fit.rms_m3,
+        )
+    others = getattr(found, "not_told_apart", ())
+    if others:
+        yield message(
+            "read_other_ends",
+            "these ends fit as well: {ends}",
+            ends=[one.replace("_", " ") for one in others],
+        )
+
+
+def _check_kind(former, kind, log):
+    if kind != "vertical":
+        expected = message(
+            "read_other_kind",
+            "of a tank of kind {kind}; expected an upright or lying one, or a sphere",
+            kind=kind,
+        )
+        log.problem(former.name, expected)
+    if len(former.height_m) < FEWEST_ROWS:
+        expected = message(
+            "read_few_rows",
+            "{count} rows; expected {fewest} or more to read radii from",
+            count=len(former.height_m),
+            fewest=FEWEST_ROWS,
+        )
+        log.problem(former.name, expected)
+
+
+def _fitting(former, courses):
+    """(the courses that the table reaches, warnings, whether their seams are known)."""
+    heights = courses.heights_m
+    unknown = np.isnan(heights)
+    last = float(former.height_m[-1])
+    if unknown.any() and not unknown.all():
+        expected = message(
+            "read_some_heights",
+            "given for some courses; expected the heights of all of them, or of none",
+        )
+        raise InputError(Problem(courses.file, expected, None, "height_m"))
+    if unknown.all():
+        return _with_seams(former, courses), (), False
+    total = float(np.sum(heights))
+    if total < last - _slack(former):
+        expected = message(
+            "read_courses_end",
+            "the courses reach {total:.4g} m, the table {last:.4g} m; expected courses up to the "
+            "last row",
+            total=total,
+            last=last,
+        )
+        raise InputError(Problem(courses.file, expected, None, "height_m"))
+    tops = np.cumsum(heights)
+    step = float(np.median(np.diff(former.height_m)))
+    reached = int(np.searchsorted(tops - heights, last - 2.5 * step, "right"))
+    if reached == len(heights):
+        return courses, (), True
+    text = message(
+        "read_not_reached",
+        "the table ends at {last:.4g} m: nothing can be read of the courses above number {count}, "
+        "and the job ends there",
+        last=last,
+        count=reached,
+    )
+    return courses.first(reached), (text,), True
+
+
+def _slack(former):
+    """What the bottom of the first course may be above the zero."""
+    return 0.35 + ABOVE_M if former.height_m[0] == 0 else ABOVE_M
+
+
+def _with_seams(former, courses):
+    """The courses with heights by the seams that the table shows."""
+    count = len(courses.names)
+    seams = find_seams(former.height_m, former.volume_m3, sd_of_rows(former), count - 1)
+    if len(seams) < count - 1:
+        expected = message(
+            "read_seams_missing",
+            "the table shows {found} of {wanted} seams; expected the heights of the courses",
+            found=len(seams),
+            wanted=count - 1,
+        )
+        raise InputError(Problem(courses.file, expected, None, "height_m"))
+    edges = np.concatenate([[0.0], seams, [former.height_m[-1]]])
+    return replace(courses, heights_m=np.diff(edges))
+
+
+def _read(former, courses, warnings, e_pa, bottom_m, seams_known):
+    found = read_upright(
+        former,
+        courses.heights_m,
+        courses.thickness_m,
+        modulus_pa=e_pa,
+        lowest_m=bottom_m,
+        seams_known=seams_known,
+    )
+    u_common = _u_common_m(former, found)
+    job = job_of_geometry(
+        former, found, courses.names, u_common_m=u_common, e_pa=e_pa, tank_id=_tank_of(former)
+    )
+    told = (*warnings, *_of_geometry(former, found, seams_known), *_of_job(former, u_common))
+    return TableRead(former, found, courses.names, job, told)
+
+
+def _u_common_m(former, found):
+    """Standard uncertainty of all radii together, by the U of the former table; 0: not known."""
+    if former.U_m3 is None:
+        return 0.0
+    upper = former.height_m > 0.5 * former.height_m[-1]
+    relative = np.median(former.U_m3[upper] / former.volume_m3[upper]) / former.k
+    return float(relative * np.mean(found.radii_m) / 2)
+
+
+def _tank_of(former):
+    if former.record is not None:
+        return former.record["job"]["tank"]["id"]
+    return str(former.name).partition(",")[0].rpartition(".")[0] or "tank"
+
+
+def _of_geometry(former, found, seams_known):
+    """What has to be known before the radii are used."""
+    if found.roughness > 1:
+        yield message(
+            "read_rough",
+            "the rows depart by {rms:.3g} L (rms) from such a tank, rounding leaves {expected:.3g} "
+            "L: there is more in this table than courses, head and things in the tank; u is "
+            "{factor:.3g} times that of rounding",
+            rms=1000 * found.rms_m3,
+            expected=1000 * found.expected_m3,
+            factor=found.roughness,
+        )
+    declared = former.liquid_density_kg_m3
+    density = found.density_kg_m3
+    value = 0.0 if found.head == "without" else density.value
+    if declared is not None and abs(declared - value) > 3 * density.u + 0.001 * declared:
+        yield message(
+            "read_other_density",
+            "declared is a head of {declared:g} kg/m3; the table was made with {found:.0f}, u "
+            "{u:.2g} kg/m3",
+            declared=declared,
+            found=value,
+            u=density.u,
+        )
+    if found.seams_are == "found" and seams_known:
+        yield message(
+            "read_other_seams",
+            "the seams are not where courses.csv has them; the radii are for the seams that were "
+            "found",
+        )
+    total = float(former.volume_m3[-1])
+    for one in found.fittings:
+        if -one.volume_m3.value > LARGE_SHARE * total and former.roof is None:
+            yield message(
+                "read_like_roof",
+                "{volume:.4g} m3 less from {bottom:.3f} to {top:.3f} m: is that a floating roof? "
+                "Its mass is needed then ([roof] of former.toml)",
+                volume=-one.volume_m3.value,
+                bottom=one.bottom_m.value,
+                top=one.top_m.value,
+            )
+
+
+def _of_job(former, u_common):
+    """What the job lacks because nobody declared it."""
+    if former.record is None and u_common == 0:
+        yield message(
+            "read_no_U",
+            "the uncertainty of the former table is not known: the job has that of reading alone "
+            "(u_common_mm in job.toml, or U and k in former.toml)",
+        )
+    if former.reference_temperature_c is None:
+        yield message(
+            "read_no_temperature",
+            "the temperature of the former table is not known: job.toml has 20 degrees Celsius",
+        )
+    if former.date is None:
+        yield message(
+            "read_no_date",
+            "the date of the former survey is not known: job.toml has the day of today",
+        )

@@ -1,0 +1,98 @@
+"""The radii of a saved result, with the covariance that its capacity table has."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+
+
+@dataclass(frozen=True)
+class RecordedRadii:
+    """Radii of the courses of a record.
+
+    Attributes
+    ----------
+    names : tuple of str
+    radii_m : ndarray, shape (n,)
+        Inside, empty, at the temperature of the record's table.
+    covariance_m2 : ndarray, shape (n, n)
+        By the covariance of the rows of its table.
+    heights_m, thickness_m : ndarray, shape (n,)
+    """
+
+    names: tuple[str, ...]
+    radii_m: np.ndarray
+    covariance_m2: np.ndarray
+    heights_m: np.ndarray
+    thickness_m: np.ndarray
+
+    @property
+    def u_m(self):
+        """(n,) standard uncertainties."""
+        return np.sqrt(np.diag(self.covariance_m2))
+
+
+def read_recorded(former):
+    """Radii out of the record that a former table is of.
+
+    Parameters
+    ----------
+    former : FormerTable
+        With its record.
+
+    Returns
+    -------
+    RecordedRadii
+
+    Raises
+    ------
+    InputError
+        For a tank that is not upright, that held liquid while it was measured, or a course that
+        no two rows of the table are in.
+    """
+    record = former.record
+    courses = record.get("courses") or []
+    if (record["job"]["tank"].get("kind") or "vertical") != "vertical" or not courses:
+        _refuse(
+            former, message("read_no_courses", "not a tank of courses; expected an upright one")
+        )
+    if (record["job"]["survey"] or {}).get("liquid_level_m"):
+        expected = message(
+            "read_filled_record",
+            "the tank held liquid when it was measured; expected the record of an empty one: run "
+            "its job again for another table",
+        )
+        _refuse(former, expected)
+    zero = record["capacity"].get("zero_m") or 0.0
+    radii = np.array([one["inside_radius_m"] for one in courses])
+    parts = [_by_rows(former, one, zero) for one in courses]
+    factor = np.array(parts) / (2 * np.pi * radii[:, None])
+    return RecordedRadii(
+        tuple(one["course"] for one in courses),
+        radii,
+        factor @ factor.T,
+        np.array([one["height_m"] for one in courses]),
+        np.array([one["thickness_m"] for one in courses]),
+    )
+
+
+def _by_rows(former, course, zero):
+    """(inputs,) derivative factor of the mean area between the rows of a course."""
+    low, high = course["bottom_m"] - zero, course["top_m"] - zero
+    rows = np.flatnonzero((former.height_m >= low - 1e-6) & (former.height_m <= high + 1e-6))
+    if len(rows) < 2:
+        expected = message(
+            "read_rows_of_course",
+            "fewer than two rows within course {course}; expected rows in each",
+            course=course["course"],
+        )
+        _refuse(former, expected)
+    first, last = rows[0], rows[-1]
+    apart = former.height_m[last] - former.height_m[first]
+    return (former.factor_m3[last] - former.factor_m3[first]) / apart
+
+
+def _refuse(former, expected):
+    raise InputError(Problem(former.name, expected))

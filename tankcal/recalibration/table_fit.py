@@ -1,0 +1,315 @@
+"""One adjustment of the rows of a table: rings, head, zero, seams, things in the tank.
+
+    V(h) = V_0 + W(h) - W(h_0) + sum over things of v share(h) + roof, if h is above its zone
+
+V_0 is the volume at the lowest row h_0 that is used. It is linear in all but the places of kinks.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tankcal.adjust import adjust
+from tankcal.errors import SolutionError
+from tankcal.recalibration.fittings import Fitting
+from tankcal.recalibration.upright_shell import Rings
+
+ZERO_SD_M, SEAM_SD_M, KINK_SD_M = 0.1, 0.05, 1.0  # so weak that a table decides; never singular
+DENSITY_SD_KG_M3 = 1e5
+MOST_ROUNDS, MOST_HALVINGS, SETTLED = 15, 6, 1e-3  # of chi2
+
+
+@dataclass(frozen=True)
+class State:
+    """What a table is taken to be, with the values of its unknowns.
+
+    Attributes
+    ----------
+    base_m3 : float
+        V_0, at `lowest_m`.
+    radii_m : ndarray, shape (n,)
+    density_kg_m3 : float
+    zero_m : float
+        Dip of the bottom of the first ring.
+    seams_m : ndarray, shape (n - 1,)
+        Heights of the seams above that.
+    rings_top_m : float
+        Height of the top of the last ring above that.
+    thickness_m : ndarray, shape (n,)
+    modulus_pa : float
+    lowest_m, highest_m : float
+        Dips of the lowest and the highest row that are used.
+    fittings : tuple of Fitting
+    roof_m3, roof_zone_m : float, (float, float) or None
+        What the roof takes above its critical zone; None: no roof.
+    free : frozenset of str
+        Of "base", "density", "zero", "seams", "kinks": what else than radii and volumes is unknown.
+    is_first_order : bool
+        Of the head.
+    density_sd_kg_m3 : float
+        Of the density that an adjustment starts with, as an observation of it.
+    """
+
+    base_m3: float
+    radii_m: np.ndarray
+    density_kg_m3: float
+    zero_m: float
+    seams_m: np.ndarray
+    rings_top_m: float
+    thickness_m: np.ndarray
+    modulus_pa: float
+    lowest_m: float
+    highest_m: float
+    fittings: tuple[Fitting, ...] = ()
+    roof_m3: float = 0.0
+    roof_zone_m: tuple[float, float] | None = None
+    free: frozenset = frozenset({"base", "density"})
+    is_first_order: bool = True
+    density_sd_kg_m3: float = DENSITY_SD_KG_M3
+
+    @property
+    def rings(self):
+        """The Rings, in dips."""
+        heights = np.concatenate([[0.0], self.seams_m, [self.rings_top_m]])
+        return Rings(self.zero_m + heights, self.thickness_m, self.modulus_pa, self.is_first_order)
+
+    def volume_m3(self, dips_m):
+        """(rows,) volume below each dip."""
+        dips = np.append(dips_m, self.lowest_m)
+        shell = self.rings.volume_m3(dips, self.radii_m, self.density_kg_m3)
+        volume = self.base_m3 + shell[:-1] - shell[-1]
+        for one in self.fittings:
+            below = one.volume_below_m3(dips)
+            volume = volume + below[:-1] - below[-1]
+        return volume + self._roof_share(dips_m) * self.roof_m3
+
+    def _roof_share(self, dips_m):
+        if self.roof_zone_m is None:
+            return np.zeros(len(dips_m))
+        low, high = self.roof_zone_m
+        return np.clip((np.asarray(dips_m) - low) / max(high - low, 1e-9), 0.0, 1.0)
+
+    @property
+    def layout(self):
+        """{name: slice} of the unknowns; of each thing three: bottom, top, volume."""
+        sizes = {
+            "base": int("base" in self.free),
+            "radii": len(self.radii_m),
+            "density": int("density" in self.free),
+            "zero": int("zero" in self.free),
+            "seams": len(self.seams_m) * ("seams" in self.free),
+            "fittings": 3 * len(self.fittings),
+            "roof": int(self.roof_zone_m is not None),
+        }
+        ends = np.cumsum(list(sizes.values()))
+        return {
+            name: slice(int(end - size), int(end))
+            for (name, size), end in zip(sizes.items(), ends, strict=True)
+        }
+
+    @property
+    def unknowns(self):
+        """(u,) their values."""
+        things = [(f.bottom_m, f.top_m, f.volume_m3) for f in self.fittings]
+        values = {
+            "base": [self.base_m3],
+            "radii": self.radii_m,
+            "density": [self.density_kg_m3],
+            "zero": [self.zero_m],
+            "seams": self.seams_m,
+            "fittings": np.ravel(things),
+            "roof": [self.roof_m3],
+        }
+        return np.concatenate(
+            [values[name][: part.stop - part.start] for name, part in self.layout.items()]
+        )
+
+    def with_unknowns(self, unknowns):
+        """The same with other values."""
+        given = {name: unknowns[part] for name, part in self.layout.items()}
+        changes = {"radii_m": given["radii"]}
+        for name, key in (("base", "base_m3"), ("density", "density_kg_m3"), ("zero", "zero_m"),
+                          ("roof", "roof_m3")):  # fmt: skip
+            if len(given[name]):
+                changes[key] = float(given[name][0])
+        if len(given["seams"]):
+            changes["seams_m"] = given["seams"]
+        things = given["fittings"].reshape(-1, 3)
+        changes["fittings"] = tuple(Fitting(*map(float, one)) for one in things)
+        return replace(self, **changes)
+
+    def design(self, dips_m):
+        """(rows, u) derivatives of `volume_m3` by the unknowns."""
+        dips = np.append(dips_m, self.lowest_m)
+        by_radius, by_density, by_edge = self.rings.derivatives(
+            dips, self.radii_m, self.density_kg_m3
+        )
+        columns = [by_radius]
+        if "density" in self.free:
+            columns.append(by_density[:, None])
+        if "zero" in self.free:
+            columns.append(by_edge.sum(axis=1, keepdims=True))
+        if "seams" in self.free:
+            columns.append(by_edge[:, 1:])
+        columns += [one.derivatives(dips) for one in self.fittings]
+        relative = np.hstack(columns)
+        parts = [relative[:-1] - relative[-1]]
+        if "base" in self.free:
+            parts.insert(0, np.ones((len(dips_m), 1)))
+        if self.roof_zone_m is not None:
+            parts.append(self._roof_share(dips_m)[:, None])
+        return np.hstack(parts)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A State that was adjusted to rows.
+
+    Attributes
+    ----------
+    state : State
+    cofactor : ndarray, shape (u, u)
+        Covariance of its unknowns, of rounding alone.
+    left_m3 : ndarray, shape (rows,)
+        Table less state.
+    sd_m3 : ndarray, shape (rows,)
+        By rounding.
+    design : ndarray, shape (rows, u)
+    chi2 : float
+        Of the rows.
+    """
+
+    state: State
+    cofactor: np.ndarray
+    left_m3: np.ndarray
+    sd_m3: np.ndarray
+    design: np.ndarray
+    chi2: float
+
+    @property
+    def dof(self):
+        """Rows less unknowns that were not held."""
+        return len(self.left_m3) - int(np.count_nonzero(np.diag(self.cofactor)))
+
+    def sd(self, name):
+        """Standard deviations of the unknowns of one name (`State.layout`)."""
+        part = self.state.layout[name]
+        return np.sqrt(np.diag(self.cofactor)[part])
+
+
+def fit(state, dips_m, volumes_m3, sd_m3):
+    """Adjust a `State` to rows of a table.
+
+    Parameters
+    ----------
+    state : State
+        With start values; seams and kinks are looked for about them, the zero about 0, weakly.
+    dips_m, volumes_m3, sd_m3 : (rows,) ndarray
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    SolutionError
+        When the rows do not determine the unknowns.
+    """
+    held, known, about, sds = _priors(state)
+    moving = np.setdiff1d(np.arange(len(state.unknowns)), held)
+    observed = np.concatenate([volumes_m3, about])
+    variances = np.concatenate([sd_m3**2, sds**2])
+    rows = np.eye(len(state.unknowns))[known][:, moving]
+
+    def misclosure(now):
+        return np.concatenate([now.volume_m3(dips_m), now.unknowns[known]]) - observed
+
+    now, w = state, misclosure(state)
+    for _ in range(MOST_ROUNDS):
+        design = np.vstack([now.design(dips_m)[:, moving], rows])
+        found = adjust(_tangent(w, design), np.zeros(len(moving)), np.zeros(len(w)), variances)
+        before, cost = now, w @ (w / variances)
+        step = np.zeros(len(now.unknowns))
+        step[moving] = found.unknowns
+        for _ in range(MOST_HALVINGS):
+            now = before.with_unknowns(before.unknowns + step)
+            w = misclosure(now)
+            if w @ (w / variances) <= cost + SETTLED:
+                break
+            step /= 2
+        if abs(cost - w @ (w / variances)) < SETTLED:
+            break
+    cofactor = np.zeros((len(state.unknowns), len(state.unknowns)))
+    cofactor[np.ix_(moving, moving)] = found.cofactor
+    left = volumes_m3 - now.volume_m3(dips_m)
+    chi2 = float(np.sum((left / sd_m3) ** 2))
+    return Fit(now, cofactor, left, sd_m3, now.design(dips_m), chi2)
+
+
+def _tangent(w, design):
+    """The linear model of a step, for `adjust`."""
+    return lambda x, l: (w + design @ x - l, design, None)
+
+
+def _priors(state):
+    """Unknowns that are held; those that are weakly known, where about, and their sds."""
+    layout = state.layout
+    sds, held = {}, []
+    density_sd = state.density_sd_kg_m3
+    for name, sd in (("zero", ZERO_SD_M), ("seams", SEAM_SD_M), ("density", density_sd)):
+        sds |= dict.fromkeys(range(layout[name].start, layout[name].stop), sd)
+    for k, one in enumerate(state.fittings):
+        place = layout["fittings"].start + 3 * k
+        for edge, is_held in enumerate(held_kinks(state, one)):
+            if is_held:
+                held.append(place + edge)
+            else:
+                sds[place + edge] = KINK_SD_M
+    known = np.array(list(sds), dtype=int)
+    about = state.unknowns[known]
+    about[np.isin(known, np.arange(len(state.unknowns))[layout["zero"]])] = 0.0
+    return np.array(held, dtype=int), known, about, np.array(list(sds.values()))
+
+
+def held_kinks(state, fitting):
+    """(bottom, top): whether a thing's kink is outside of the rows, and cannot be looked for."""
+    if "kinks" not in state.free:
+        return True, True
+    return fitting.bottom_m <= state.lowest_m, fitting.top_m >= state.highest_m
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of a table.
+
+    Attributes
+    ----------
+    dip_m, volume_m3, sd_m3 : (rows,) ndarray
+        sd_m3: by rounding.
+    """
+
+    dip_m: np.ndarray
+    volume_m3: np.ndarray
+    sd_m3: np.ndarray
+
+    def above(self, dip_m):
+        """Those from a dip on."""
+        return self.of(self.dip_m >= dip_m - 1e-9)
+
+    def of(self, mask):
+        """Those of a mask."""
+        return Rows(self.dip_m[mask], self.volume_m3[mask], self.sd_m3[mask])
+
+    def adjust(self, state):
+        """The Fit of a State to them."""
+        lowest, highest = float(self.dip_m[0]), float(self.dip_m[-1])
+        state = replace(state, lowest_m=lowest, highest_m=highest)
+        return fit(state, self.dip_m, self.volume_m3, self.sd_m3)
+
+
+def tried(rows, state):
+    """The Fit of a State to Rows, or None where they do not determine it."""
+    try:
+        return rows.adjust(state)
+    except SolutionError:
+        return None

@@ -1,0 +1,399 @@
+"""The geometry of an upright tank out of its capacity table.
+
+Rows below the highest point of the bottom, and those of a roof's critical zone, are left out; the
+others are adjusted (`table_fit.fit`). What stands in the tank is looked for as pairs of kinks
+(`fittings.find_fittings`), one after the other, until none explains more than rounding does by
+chance. Then the table is asked whether it has a head, where its zero is, and whether the seams are
+where they were declared to be.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tankcal.adjust import CRITICAL
+from tankcal.errors import SolutionError
+from tankcal.messages import message
+from tankcal.recalibration.rounding import roughness, scale_of_u, sd_of_rows
+from tankcal.recalibration.table_fit import Rows, State, held_kinks, tried
+from tankcal.recalibration.upright_search import LEAST_GAIN, SAME_ZERO, search, with_sure_fittings
+
+STEEL_PA = 206e9
+START_DENSITY_KG_M3 = 500.0
+USUAL_KG_M3 = 450.0, 450.0  # of a head that a table cannot tell: about this, with this sd
+DECLARED_SD_KG_M3 = 10.0
+LIQUID_KG_M3 = 500.0  # a head that a table could not have shown of any liquid is undecided
+FEWEST_ROWS = 3  # of a ring
+BY_ORDER = 1.0  # of chi2, by which the head of second order has to fit better
+ORDER_IS_CLEAR = 9.0
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A value that was read out of a table, and what rounding leaves uncertain of it (standard)."""
+
+    value: float
+    u: float
+
+
+@dataclass(frozen=True)
+class FoundFitting:
+    """A thing that the table has deducted, or added.
+
+    Attributes
+    ----------
+    bottom_m, top_m, volume_m3 : Reading
+        Dips; u is nan where the end is beyond the rows that were used.
+    """
+
+    bottom_m: Reading
+    top_m: Reading
+    volume_m3: Reading
+
+
+@dataclass(frozen=True)
+class UprightGeometry:
+    """What a table says of its tank.
+
+    Attributes
+    ----------
+    name : str
+        Of the table.
+    radii_m, u_m : ndarray, shape (n,)
+        Inside, of the empty shell, at the table's temperature; u by rounding alone.
+    covariance_m2 : ndarray, shape (n, n)
+        Of the radii.
+    heights_m, thickness_m : ndarray, shape (n,)
+        Of the rings that the table reaches.
+    zero_m : Reading
+        Dip of the bottom of the first ring; u is 0 where the table is empty at its zero and begins
+        there, nan where that cannot be told because the seams are found, too.
+    seams_m : tuple of Reading
+        Dips of the seams, each looked for by itself; u is large where nothing jumps there.
+    seams_are : {"declared", "found"}
+        Which of them the radii are for.
+    density_kg_m3 : Reading
+    head : {"with", "without", "undecided"}
+    t : float
+        Density over its u.
+    fittings : tuple of FoundFitting
+    roof_m3 : Reading or None
+        What a declared roof takes above its critical zone; negative.
+    base_m3 : Reading
+        Volume at `lowest_m`, the lowest row that is used.
+    lowest_m : float
+    used : ndarray of bool, shape (rows,)
+    left_m3 : ndarray, shape (rows,)
+        Table less what was read, at each row.
+    rms_m3, largest_m3, expected_m3 : float
+        Of the rows that are used; what rounding would leave.
+    without_head : (rms, largest, radii) or None
+        Of the same with the head left out: m3, m3, (n,) m.
+    roughness : float
+        What u was multiplied by because rows have more in them than rounding; 1: nothing.
+    state : State
+        All of it, as a function of the dip.
+    independent_u : (float, ndarray)
+        Standard deviations of density and (n,) radii if each row were rounded independently of the
+        others; u is never less (`rounding`).
+    """
+
+    name: str
+    radii_m: np.ndarray
+    u_m: np.ndarray
+    covariance_m2: np.ndarray
+    heights_m: np.ndarray
+    thickness_m: np.ndarray
+    zero_m: Reading
+    seams_m: tuple[Reading, ...]
+    seams_are: str
+    density_kg_m3: Reading
+    head: str
+    t: float
+    fittings: tuple[FoundFitting, ...]
+    roof_m3: Reading | None
+    base_m3: Reading
+    lowest_m: float
+    used: np.ndarray
+    left_m3: np.ndarray
+    rms_m3: float
+    largest_m3: float
+    expected_m3: float
+    without_head: tuple[float, float, np.ndarray] | None
+    roughness: float
+    state: State
+    independent_u: tuple[float, np.ndarray]
+
+
+def read_upright(
+    former,
+    heights_m,
+    thickness_m,
+    *,
+    modulus_pa=STEEL_PA,
+    known=(),
+    lowest_m=None,
+    seams_known=True,
+):
+    """Radii, density of the head, zero, things in the tank: out of a table.
+
+    Parameters
+    ----------
+    former : FormerTable
+    heights_m, thickness_m : array_like, shape (n,)
+        Of the rings, from the bottom up; all must be reached by the table.
+    modulus_pa : float
+    known : sequence of Fitting
+        Things that are known to be in the table, in its dips: taken out first.
+    lowest_m : float, optional
+        Dip of the highest point of the bottom; None: found.
+    seams_known : bool
+        False: `heights_m` are start values only.
+
+    Returns
+    -------
+    UprightGeometry
+
+    Raises
+    ------
+    SolutionError
+        When rows are too few, or do not determine the radii.
+    """
+    heights, plates = np.asarray(heights_m, float), np.asarray(thickness_m, float)
+    volume = former.volume_m3 - sum((one.volume_below_m3(former.height_m) for one in known), 0.0)
+    rows = Rows(former.height_m, volume, sd_of_rows(former))
+    zone = former.roof.critical_m if former.roof else None
+    used = np.ones(len(volume), dtype=bool)
+    if zone is not None:
+        used = (rows.dip_m < zone[0]) | (rows.dip_m > zone[1])
+    empty = rows.volume_m3 <= 0
+    if np.count_nonzero(empty) > 1:  # dips below the bottom
+        used &= ~empty
+    usable = rows.of(used)
+    state = _start(usable, heights, plates, modulus_pa, zone)
+    found = search(usable, state, lowest_m)
+    used &= rows.dip_m >= found.state.lowest_m - 1e-9
+    return _geometry(former, found, rows, used, seams_known)
+
+
+def _start(rows, heights, plates, modulus, zone):
+    """The State before anything is adjusted: radii by the mean area of each ring."""
+    edges = np.concatenate([[0.0], np.cumsum(heights)])
+    radii = np.zeros(len(heights))
+    for k in range(len(heights)):
+        inside = np.flatnonzero((rows.dip_m >= edges[k]) & (rows.dip_m <= edges[k + 1]))
+        if len(inside) < FEWEST_ROWS:
+            raise SolutionError(
+                message(
+                    "former_few_rows",
+                    "{count} rows in course {course}; expected {fewest} or more to read its radius",
+                    count=len(inside),
+                    course=k + 1,
+                    fewest=FEWEST_ROWS,
+                )
+            )
+        upper = inside[len(inside) // 2 :] if k == 0 and len(inside) > 5 else inside
+        rise = rows.volume_m3[upper[-1]] - rows.volume_m3[upper[0]]
+        area = rise / (rows.dip_m[upper[-1]] - rows.dip_m[upper[0]])
+        radii[k] = np.sqrt(max(area, 1e-6) / np.pi)
+    return State(
+        base_m3=float(rows.volume_m3[0]),
+        radii_m=radii,
+        density_kg_m3=START_DENSITY_KG_M3,
+        zero_m=0.0,
+        seams_m=edges[1:-1],
+        rings_top_m=float(edges[-1]),
+        thickness_m=plates,
+        modulus_pa=modulus,
+        lowest_m=float(rows.dip_m[0]),
+        highest_m=float(rows.dip_m[-1]),
+        roof_zone_m=zone,
+    )
+
+
+def _geometry(former, found, rows, used, seams_known):
+    chosen = rows.of(used)
+    found = with_sure_fittings(
+        chosen, _with_known_zero(chosen, former, found), former.volume_quantum_m3
+    )
+    found, other = _with_order(chosen, found)
+    seams = found if "seams" in found.state.free else _free_seams(chosen, found)
+    if seams is not None and (not seams_known or _are_elsewhere(found, seams)):
+        found = seams
+    seams_are = "found" if "seams" in found.state.free else "declared"
+    quantum = former.volume_quantum_m3
+    scale = scale_of_u(found, chosen, quantum)
+    layout, by_order = found.state.layout, _by_order(found, other)
+    u_density = float(np.hypot((found.sd("density") * scale[layout["density"]])[0], by_order[0]))
+    t = found.state.density_kg_m3 / u_density
+    density = Reading(found.state.density_kg_m3, u_density)
+    head, without = _decide_head(t, u_density), None
+    independent = _independent(found)
+    dry = _without_head(chosen, found)
+    if head != "without":
+        without = (*_remainders(dry.left_m3), dry.state.radii_m)
+    if head == "undecided":
+        found, other = _with_usual_density(chosen, former, found), None
+    if head == "without":
+        found, other = dry, None
+    scale = scale_of_u(found, chosen, quantum)
+    u_seams = (
+        seams.sd("seams") * scale_of_u(seams, chosen, quantum)[seams.state.layout["seams"]]
+        if seams
+        else None
+    )
+    return _as_geometry(
+        former, found, rows, used,
+        scale=scale, density=density, head=head, t=t, without=without,
+        seams=_seam_readings(seams.state if seams else found.state, u_seams),
+        seams_are=seams_are, by_order=_by_order(found, other)[1], independent=independent,
+    )  # fmt: skip
+
+
+def _independent(found):
+    """(density, (n,) radii): their standard deviations if rounding were independent."""
+    return float(found.sd("density")[0]), found.sd("radii")
+
+
+def _with_order(rows, found):
+    """The Fit with the head of the order that leaves less, and that of the other one.
+
+    The first order where both do as well; the other is None where it is clearly worse.
+    """
+    try:
+        second = rows.adjust(replace(found.state, is_first_order=False))
+    except SolutionError:
+        return found, None
+    better = found.chi2 - second.chi2
+    first, last = (second, found) if better > BY_ORDER else (found, second)
+    return first, last if abs(better) < ORDER_IS_CLEAR else None
+
+
+def _by_order(found, other):
+    """(sd of density, (n,) of radii) because the order of the head is not known."""
+    if other is None:
+        return 0.0, np.zeros(len(found.state.radii_m))
+    density = abs(found.state.density_kg_m3 - other.state.density_kg_m3)
+    return density / np.sqrt(3), (found.state.radii_m - other.state.radii_m) / np.sqrt(3)
+
+
+def _with_known_zero(rows, former, found):
+    """The Fit with an empty tank at dip 0, the bottom of the first ring: when nothing says no."""
+    if not (rows.dip_m[0] == 0 and rows.volume_m3[0] == 0) or former.volume_quantum_m3 == 0:
+        return found
+    free = found.state.free - {"zero", "base"}
+    try:
+        held = rows.adjust(replace(found.state, zero_m=0.0, base_m3=0.0, free=free))
+    except SolutionError:
+        return found
+    return held if held.chi2 - found.chi2 < SAME_ZERO**2 + 2 else found
+
+
+def _free_seams(rows, found):
+    """The Fit with each seam where it is found by itself; None where that fails."""
+    if not len(found.state.seams_m):
+        return None
+    free = (found.state.free | {"seams"}) - {"zero"}
+    try:
+        seams = rows.adjust(replace(found.state, free=free))
+    except SolutionError:
+        return None
+    return seams if np.all(np.diff(seams.state.rings.edges_m) > 0) else None
+
+
+def _are_elsewhere(found, seams):
+    """Whether seams are not where they were declared: one of them clearly, or all by chi2."""
+    apart = np.abs(seams.state.seams_m - found.state.seams_m)
+    count = len(apart)
+    return bool(np.any(apart > CRITICAL * seams.sd("seams"))) and (
+        found.chi2 - seams.chi2 > LEAST_GAIN + count
+    )
+
+
+def _without_head(rows, found):
+    """The Fit of the same with the head left out."""
+    free = found.state.free - {"density"}
+    dry = replace(found.state, density_kg_m3=0.0, free=free)
+    found = tried(rows, dry) or tried(rows, replace(dry, free=free - {"kinks"}))
+    return found or rows.adjust(replace(dry, free=free - {"kinks", "zero"}))
+
+
+def _with_usual_density(rows, former, found):
+    """The Fit with the declared density, or that of some liquid or none: the table cannot tell."""
+    usual, sd = USUAL_KG_M3
+    if former.liquid_density_kg_m3 is not None:
+        usual, sd = former.liquid_density_kg_m3, DECLARED_SD_KG_M3
+    state = replace(found.state, density_kg_m3=usual, density_sd_kg_m3=sd)
+    return tried(rows, state) or found
+
+
+def _decide_head(t, u_density):
+    if t > CRITICAL:
+        return "with"
+    return "without" if CRITICAL * u_density < LIQUID_KG_M3 else "undecided"
+
+
+def _remainders(left):
+    return float(np.sqrt(np.mean(left**2))), float(np.abs(left).max())
+
+
+def _as_geometry(former, found, rows, used, *, scale, density, head, t, without, seams,
+                 seams_are, by_order, independent):  # fmt: skip
+    state, layout = found.state, found.state.layout
+    radii = layout["radii"]
+    covariance = found.cofactor[radii, radii] * np.outer(scale[radii], scale[radii])
+    covariance = covariance + np.outer(by_order, by_order)
+    sd = {name: found.sd(name) * scale[part] for name, part in layout.items()}
+    rms, largest = _remainders(found.left_m3)
+    chosen = rows.of(used)
+    edges = state.rings.edges_m
+    return UprightGeometry(
+        name=former.name,
+        radii_m=state.radii_m,
+        u_m=np.sqrt(np.diag(covariance)),
+        covariance_m2=covariance,
+        heights_m=np.diff(edges),
+        thickness_m=state.thickness_m,
+        zero_m=_zero_reading(state, sd["zero"]),
+        seams_m=seams,
+        seams_are=seams_are,
+        density_kg_m3=density,
+        head=head,
+        t=float(t),
+        fittings=_found_fittings(state, sd["fittings"]),
+        roof_m3=Reading(state.roof_m3, *sd["roof"]) if state.roof_zone_m else None,
+        base_m3=Reading(state.base_m3, *sd["base"]) if len(sd["base"]) else Reading(0.0, 0.0),
+        lowest_m=state.lowest_m,
+        used=used,
+        left_m3=former.volume_m3 - state.volume_m3(former.height_m),
+        rms_m3=rms,
+        largest_m3=largest,
+        expected_m3=float(np.sqrt(np.mean(chosen.sd_m3**2))),
+        without_head=without,
+        roughness=roughness(found, chosen),
+        state=state,
+        independent_u=independent,
+    )
+
+
+def _zero_reading(state, sds):
+    """Zero, with u 0 where the table is empty at its zero, nan where seams are not known."""
+    if len(sds):
+        return Reading(state.zero_m, float(sds[0]))
+    return Reading(state.zero_m, np.nan if "base" in state.free else 0.0)
+
+
+def _seam_readings(state, sds):
+    dips = state.rings.edges_m[1:-1]
+    sds = np.full(len(dips), np.nan) if sds is None else sds
+    return tuple(Reading(float(d), float(u)) for d, u in zip(dips, sds, strict=True))
+
+
+def _found_fittings(state, sds):
+    found = []
+    for k, one in enumerate(state.fittings):
+        held = held_kinks(state, one)
+        u = [np.nan if h else s for h, s in zip(held, sds[3 * k : 3 * k + 2], strict=True)]
+        volume = Reading(one.volume_m3, float(sds[3 * k + 2]))
+        found.append(FoundFitting(Reading(one.bottom_m, u[0]), Reading(one.top_m, u[1]), volume))
+    return tuple(sorted(found, key=lambda one: one.bottom_m.value))

@@ -1,0 +1,326 @@
+"""The search for what a table of an upright tank is made of: bottom, zero, things, seams.
+
+The first ring is followed downwards as far as its rows are those of one cut: below is the bottom.
+The zero is taken where seams jump together (`zero.find_zeros`). Things are looked for as pairs of
+kinks, one after the other, until none explains more than rounding does by chance; where they are
+many, or look like seams from a wrong zero, other zeros and moved seams are tried, and what explains
+the rows by the fewest things is believed.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tankcal.adjust import CRITICAL
+from tankcal.errors import SolutionError
+from tankcal.messages import message
+from tankcal.recalibration.fittings import find_fittings, in_other_pairs
+from tankcal.recalibration.rounding import ROUGH, rounded_again, scale_of_u
+from tankcal.recalibration.table_fit import tried
+from tankcal.recalibration.zero import FARTHEST_M, find_zeros, move_seams
+
+SEAMS_FREE = "base", "density", "seams"
+LEAST_GAIN = 25.0  # of chi2 by a thing: less is what the best of all pairs gains by chance
+MOST_FITTINGS, FEW_FITTINGS = 12, 4
+DOUBTFUL_GAIN, CHANCES, MARGIN = 300.0, 8, 1.2  # of a thing that rounding may look like
+LEAST_SIZE = 3.0  # last digits of the table
+SAME_COST = 1.0
+LEAST_CHI2 = 0.8  # of a degree of freedom, by which no table is under
+SAME_SLOPES = 0.03, 0.15  # of the largest kink, that are none, when kinks are paired again
+LENGTHS_M = 1.0, 3.0, np.inf  # of things, in the order in which they are looked for
+USUAL_ZEROS_M = 0.0, -0.04, 0.04  # that are tried, too, where things are many
+NEAR_M = 0.025  # that the zero may go from where it was looked for
+CUT_M, CUT_ROWS = 0.4, 9  # of the rows that have to be of one cut, so that the bottom is below
+BOTTOM_TRIES = 60
+LOW_M, LOW_SHARE = 0.15, 0.2  # things lower than this take no more of the cut: that is the bottom
+EDGE_M = 0.1  # below the first seam: where rows of the first ring end, the zero being unknown
+SAME_ZERO = 3.0  # standard deviations
+
+
+def search(rows, state, lowest_m):
+    """The Fit of all that is found in rows.
+
+    Parameters
+    ----------
+    rows : Rows
+    state : State
+        With start values.
+    lowest_m : float or None
+        Dip of the highest point of the bottom; None: found.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    SolutionError
+        When the rows do not determine the radii.
+    """
+    if lowest_m is not None:
+        rows = rows.above(lowest_m)
+        return _with_moved_seams(rows, _with_fittings(rows, state))
+    lowest = _lowest_row(rows, state)
+    found = _with_moved_seams(rows.above(lowest), _with_fittings(rows.above(lowest), state))
+    if lowest > rows.dip_m[0]:
+        more = replace(found.state, lowest_m=float(rows.dip_m[0]))
+        try:
+            whole = _with_fittings(rows, more, at_most=len(found.state.fittings) + 1)
+        except SolutionError:
+            return found
+        if _is_by_rounding(whole) and _is_enough(rows, found, whole):
+            return whole
+    return found
+
+
+def _with_moved_seams(rows, found):
+    """The Fit with seams where the rows show them, if that spares things that look like seams."""
+    if _is_plain(found) or not len(found.state.seams_m):
+        return found
+    zero = found.state.zero_m
+    edges = found.state.rings.edges_m[1:-1]
+    moved = move_seams(rows.dip_m, rows.volume_m3, rows.sd_m3, edges) - zero
+    if np.any(np.diff(moved) <= 0):
+        return found
+    state = replace(found.state, seams_m=moved, fittings=(), free=frozenset(SEAMS_FREE))
+    other = _from_zero(rows.above(zero + NEAR_M), state, MOST_FITTINGS)
+    price = LEAST_GAIN * len(moved) / 2
+    is_better = other is not None and _cost(other) + price < _cost(found)
+    return _with_lower_rows(rows, other) if is_better else found
+
+
+def _is_enough(rows, found, whole):
+    """Whether rows far more than their new unknowns are explained by these."""
+    return len(rows.dip_m) - len(found.left_m3) > 10 * (
+        len(whole.state.unknowns) - len(found.state.unknowns)
+    )
+
+
+def _is_by_rounding(found):
+    """Whether nothing is left but rounding: as a whole, and at the worst row."""
+    worst = np.abs(found.left_m3 / found.sd_m3).max()
+    return found.chi2 < ROUGH**2 * max(found.dof, 1) and worst < np.sqrt(3) * 1.25
+
+
+def _lowest_row(rows, state):
+    """Dip from which on rows are those of one cut: above the highest point of the bottom.
+
+    The lowest row of the first ring above which a parabola leaves nothing but rounding.
+    """
+    first = rows.dip_m <= state.seams_m[0] - EDGE_M if len(state.seams_m) else rows.dip_m >= 0
+    ring = rows.of(first)
+    length = max(CUT_M, CUT_ROWS * float(np.median(np.diff(rows.dip_m))))
+    tries = np.flatnonzero(ring.dip_m <= ring.dip_m[-1] - length) if len(ring.dip_m) else ()
+    if len(tries) == 0:
+        return float(rows.dip_m[0])
+    for place in [int(tries[0]), *_halving(tries)]:
+        dip = ring.dip_m[place]
+        window = ring.of((ring.dip_m >= dip) & (ring.dip_m <= dip + length + 1e-9))
+        if _is_one_cut(window):
+            return float(dip)
+    return float(rows.dip_m[0])
+
+
+def _halving(tries):
+    """At most BOTTOM_TRIES of the rows, rising; closer together at the bottom."""
+    last = len(tries) - 1
+    places = np.round(last * np.linspace(0, 1, BOTTOM_TRIES) ** 1.5).astype(int)
+    return tries[np.unique(places)]
+
+
+def _is_one_cut(ring):
+    """Whether a parabola leaves no more than rounding of rows."""
+    if len(ring.dip_m) < 5:
+        return False
+    x = (ring.dip_m - ring.dip_m[0]) / (ring.dip_m[-1] - ring.dip_m[0])
+    basis = np.vander(x, 3) / ring.sd_m3[:, None]
+    value = (ring.volume_m3 - ring.volume_m3[0]) / ring.sd_m3
+    left = value - basis @ np.linalg.lstsq(basis, value, rcond=None)[0]
+    dof = len(x) - 3
+    is_rounding = np.abs(left).max() < np.sqrt(3) * 1.25
+    lower = left[: max(len(left) // 4, 2)]  # a bottom shows here first
+    return (
+        is_rounding
+        and left @ left < dof + 4 * np.sqrt(dof)
+        and abs(lower.sum()) < 4 * np.sqrt(len(lower))
+    )
+
+
+def _with_fittings(rows, state, at_most=MOST_FITTINGS):
+    """The Fit with the things that the rows show, from the zero that needs the fewest of them.
+
+    A zero that is far off lets seams look like things, so that others are tried where things are
+    many, or do not explain the rows.
+    """
+    zeros = find_zeros(rows.dip_m, rows.volume_m3, rows.sd_m3, state.seams_m)
+    best, tried = None, 0
+    for zero in (state.zero_m,) if state.fittings else (zeros[0], *USUAL_ZEROS_M, *zeros[1:]):
+        most = at_most if best is None else min(at_most, _most_fittings(best))
+        other = _from_zero(rows.above(zero + NEAR_M), replace(state, zero_m=zero), most)
+        if other and (best is None or _cost(other) < _cost(best) - SAME_COST):
+            best = other
+        if best and _is_plain(best) and _is_by_rounding(best):
+            break
+        tried += other is None or len(other.state.fittings) >= at_most
+        if tried > 1:
+            break
+    if best is None:
+        raise SolutionError(
+            message("former_undetermined", "the rows of the table do not determine the radii")
+        )
+    if len(best.state.fittings) > FEW_FITTINGS and not _is_by_rounding(best):
+        bare = replace(best.state, fittings=())  # things without end explain what is not their own
+        best = _with_free_zero(rows.above(best.state.lowest_m), bare, bare.zero_m) or best
+    return _with_lower_rows(rows, best)
+
+
+def _with_lower_rows(rows, found):
+    """The Fit with rows that were left out because the first ring might have begun among them."""
+    more = len(rows.dip_m) - len(found.left_m3)
+    for lowest in rows.dip_m[:more]:
+        chosen = rows.above(lowest)
+        again = tried(chosen, replace(found.state, base_m3=float(chosen.volume_m3[0])))
+        if again and _is_possible(again):
+            gain = again.chi2 - found.chi2
+            if gain < len(chosen.dip_m) - len(found.left_m3) + SAME_ZERO**2:
+                return again
+    return found
+
+
+def _most_fittings(best):
+    """How many things another Fit may have and still be the cheaper one."""
+    return max(int((_cost(best) - LEAST_CHI2 * best.dof) / LEAST_GAIN), 0)
+
+
+def _is_plain(found):
+    """Whether its things are few, and none of them what seams look like from a wrong zero."""
+    seams = found.state.rings.edges_m[1:-1]
+    return len(found.state.fittings) <= FEW_FITTINGS and all(
+        one.volume_m3 < 0
+        and one.top_m - one.bottom_m < LENGTHS_M[0]
+        and not np.any(np.abs(seams - one.bottom_m) < NEAR_M)
+        and not np.any(np.abs(seams - one.top_m) < NEAR_M)
+        for one in found.state.fittings
+    )
+
+
+def _cost(found):
+    return found.chi2 + LEAST_GAIN * len(found.state.fittings)
+
+
+def _from_zero(rows, start, at_most):
+    """The Fit with things, the zero free about where it starts; None where rows do not do.
+
+    Short things first: two kinks of two things, one above the other, look like one thing.
+    """
+    about = start.zero_m
+    found = _with_free_zero(rows, start, about)
+    for longest in LENGTHS_M if found else ():
+        while len(found.state.fittings) < at_most and found.dof > 6:
+            again = _with_one_more(rows, found, longest, about)
+            if again is None:
+                break
+            found = again
+    return _tidied(rows, found, about) if found else None
+
+
+def _with_one_more(rows, found, longest, about):
+    """The Fit with the thing that explains most; None where none explains enough."""
+    candidates = find_fittings(rows.dip_m, found.left_m3, found.design, rows.sd_m3, longest)
+    for thing, gain in candidates:
+        if gain < LEAST_GAIN:
+            break
+        more = replace(found.state, fittings=(*found.state.fittings, thing))
+        again = _with_free_zero(rows, more, about)
+        if again and found.chi2 - again.chi2 > LEAST_GAIN and _are_large(rows, again):
+            return again
+    return None
+
+
+def _are_large(rows, found):
+    """Whether no thing is so small that two rounded digits explain it."""
+    least = LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
+    return all(abs(one.volume_m3) > least for one in found.state.fittings)
+
+
+def _tidied(rows, found, about):
+    """The Fit with fewer things, where fewer explain the rows as well."""
+    if len(found.state.fittings) > 1:
+        near = 1.6 * float(np.median(np.diff(rows.dip_m)))
+        for share in SAME_SLOPES:
+            pairs = in_other_pairs(found.state.fittings, near, share)
+            found = _cheaper(rows, found, pairs, about)
+    for one in sorted(found.state.fittings, key=lambda one: abs(one.volume_m3)):
+        rest = tuple(f for f in found.state.fittings if f.volume_m3 != one.volume_m3)
+        found = _cheaper(rows, found, rest, about)
+    return found
+
+
+def with_sure_fittings(rows, found, quantum_m3):
+    """The Fit without things whose volume is no more than its uncertainty, the least sure first."""
+    while found.state.fittings:
+        things = found.state.fittings
+        scale = scale_of_u(found, rows, quantum_m3)[found.state.layout["fittings"]]
+        sds = (found.sd("fittings") * scale)[2::3]
+        sizes = np.abs([one.volume_m3 for one in things]) / sds
+        worst = int(np.argmin(sizes))
+        rest = things[:worst] + things[worst + 1 :]
+        again = tried(rows, replace(found.state, fittings=rest))
+        rise = np.inf if again is None else again.chi2 - found.chi2
+        limit = 2 * LEAST_GAIN if sizes[worst] < CRITICAL else LEAST_GAIN
+        if limit < rise < DOUBTFUL_GAIN and quantum_m3 > 0:
+            limit = MARGIN * _gain_by_chance(again, rows, quantum_m3)
+        if rise > limit:
+            break
+        found = again
+    return found
+
+
+def _gain_by_chance(found, rows, quantum):
+    """What a thing gains of chi2 because rounding goes on from row to row: the largest of draws."""
+    q = np.linalg.qr(found.design / rows.sd_m3[:, None])[0]
+    gains = []
+    for error in rounded_again(found, rows, quantum, CHANCES):
+        left = error / rows.sd_m3
+        left = (left - q @ (q.T @ left)) * rows.sd_m3
+        best = find_fittings(rows.dip_m, left, found.design, rows.sd_m3, most=1)
+        gains.append(best[0][1] if best else 0.0)
+    return max(gains)
+
+
+def _cheaper(rows, found, fittings, about):
+    if len(fittings) > len(found.state.fittings):
+        return found
+    other = _with_free_zero(rows, replace(found.state, fittings=fittings), about)
+    return other if other and _cost(other) < _cost(found) else found
+
+
+def _is_possible(found):
+    state = found.state
+    largest = LOW_SHARE * np.pi * state.radii_m[0] ** 2
+    return abs(state.zero_m) <= FARTHEST_M and all(
+        one.bottom_m < one.top_m
+        and (
+            one.bottom_m > state.lowest_m + LOW_M
+            or abs(one.volume_m3) < largest * (one.top_m - one.bottom_m)
+        )
+        for one in state.fittings
+    )
+
+
+def _with_free_zero(rows, state, about):
+    """The Fit with the zero free where it stays near, and with things where they are found to be.
+
+    Where that fails, the zero is held, or things where they were looked for; None: all fails.
+    """
+    things = {"kinks"} if state.fittings else set()
+    zero = {"zero"} if len(state.seams_m) and "seams" not in state.free else set()
+    held = state.free - {"zero", "kinks"}
+    for free in dict.fromkeys(
+        map(frozenset, (held | things | zero, held | things, held | zero, held))
+    ):
+        start = state if "zero" in free else replace(state, zero_m=about)
+        again = tried(rows, replace(start, free=free))
+        if again and _is_possible(again) and abs(again.state.zero_m - about) <= NEAR_M:
+            return again
+    return None

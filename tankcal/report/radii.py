@@ -1,0 +1,35 @@
+"""Former radii on paper: where they come from, how they may have changed, what was found."""
+
+from tankcal.report.radii_source import source_text
+from tankcal.report.tables.radii import RADII
+
+
+def facts(paper):
+    """Source, temperature and common uncertainty of the radii; the change that was declared."""
+    radii = paper.record["radii"]
+    change = radii["change"] or {}
+    return paper.facts(
+        [
+            ("radii_source", source_text(paper)),
+            ("radii_temperature", paper.number(radii["temperature_c"], "degC", digits=3)),
+            ("radii_u_common", _of_type_b(paper, radii["u_common_m"])),
+            ("change_common", _of_type_b(paper, change.get("common_m"))),
+            ("change_own", _of_type_b(paper, change.get("own_m"))),
+            ("change_shared", _of_type_b(paper, change.get("shared_m") or None)),
+        ]
+    )
+
+
+def courses(paper):
+    """The table of courses; beside a new survey with what it found."""
+    change = paper.record["radii"]["change"]
+    if change is None:
+        return paper.show(RADII)
+    limit = paper.number(change["limit_w"], "", decimals=0)
+    return paper.show(RADII, on="radii_updated", limit=limit)
+
+
+def _of_type_b(paper, u_m):
+    if u_m is None:
+        return None
+    return paper.word("texts.of_type_b", u=paper.number(u_m, "mm", digits=2))
