@@ -289,44 +289,6 @@ def declared_sizes(fit: SolidFit) -> dict:
     return {"horizontal": keys} | datum
 
 
-def declared_job(fit: SolidFit, former: FormerTable, tank_id: str) -> dict:
-    """The sections of a job.toml with declared sizes, for the table of the same conditions.
-
-    Parameters
-    ----------
-    fit : SolidFit
-    former : FormerTable
-    tank_id : str
-
-    Returns
-    -------
-    dict
-        {section: {key: value}}; what the former table does not say is "": to be filled in. The
-        sizes count as measured inside at the former reference temperature, so that another one
-        under [table] is a correction.
-    """
-    temperature = former.reference_temperature_c
-    temperature = "" if temperature is None else temperature
-    steps = np.diff(former.height_m)
-    sections = {
-        "tank": {"id": tank_id, "kind": fit.kind},
-        "survey": {
-            "side": "inside",
-            "date": former.date or "",
-            "shell_temperature_c": temperature,
-        },
-        "table": {
-            "step_m": _rounded(np.median(steps)),
-            "reference_temperature_c": temperature,
-        },
-    }
-    for section, keys in declared_sizes(fit).items():
-        sections[section] = keys
-    if former.reference_height_m is not None:
-        sections["datum"]["reference_height_m"] = former.reference_height_m
-    return sections
-
-
 def declared_uncertainties(fit: SolidFit, former: FormerTable) -> list[dict]:
     """Rows of uncertainty.csv for a job with these sizes: rounding, and U of the former table.
 
@@ -339,7 +301,7 @@ def declared_uncertainties(fit: SolidFit, former: FormerTable) -> list[dict]:
     Returns
     -------
     list of dict
-        With the keys input, u, unit, note; u in mm.
+        With the keys input, u, unit, note; sizes in mm.
     """
     units = {"zero": "datum", "diameter": "diameter", "length": "length", "end_depth": "end_depth"}
     rows = []
@@ -351,9 +313,11 @@ def declared_uncertainties(fit: SolidFit, former: FormerTable) -> list[dict]:
             share = former.U_m3[-1] / former.k / former.volume_m3[-1]
             power = 3 if fit.kind == "sphere" else 2
             u = float(np.hypot(u, value * share / power))
-            note = "read from a table: its rounding, and U of its last row"
+            note = "read from a table: its rounding and U of its last row"
         rows.append({"input": units[name], "u": float(f"{1e3 * u:.3g}"), "unit": "mm",
                      "note": note})  # fmt: skip
+    note = "sizes are at the reference temperature of the table"
+    rows.append({"input": "shell_temperature", "u": 0, "unit": "K", "note": note})
     return rows
 
 
@@ -542,6 +506,6 @@ def _rounded(value):
 
 
 __all__ = [
-    "ENDS", "LyingGeometry", "SolidFit", "declared_job", "declared_sizes",
-    "declared_uncertainties", "fit_lying", "fit_sphere",
+    "ENDS", "LyingGeometry", "SolidFit", "declared_sizes", "declared_uncertainties", "fit_lying",
+    "fit_sphere",
 ]  # fmt: skip
