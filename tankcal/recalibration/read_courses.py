@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from tankcal.job.checking import refuse_repeated
-from tankcal.job.contract.courses import COLUMNS, SMALLEST_THICKNESS_MM
+from tankcal.job.contract.courses import COLUMNS, SMALLEST_THICKNESS_MM, no_courses
 from tankcal.job.entries import read_columns
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import read_bytes
@@ -61,10 +61,7 @@ def read_courses(path, log):
     if len(log.problems) > before or values.skipped:
         return None
     if values.is_empty:
-        expected = message(
-            "no_courses", "no rows; expected one row for each course, from the bottom up"
-        )
-        log.problem(path.name, expected)
+        log.problem(path.name, no_courses())
         return None
     refuse_repeated(values, "course", log)
     plates = values.of("thickness_mm")

@@ -26,6 +26,19 @@ def sd_of_rows(former):
     return np.hypot(own, np.gradient(volumes, dips) * former.height_rounding_m / np.sqrt(3))
 
 
+def rounded_again(found, rows, quantum_m3, draws=DRAWS):
+    """(draws, rows) rounding errors of tanks that a Fit leaves possible, m3."""
+    sds = np.sqrt(np.diag(found.cofactor))
+    random = np.random.default_rng(SEED)
+    safe = np.where(sds > 0, sds, 1.0)
+    values, vectors = np.linalg.eigh(found.cofactor / np.outer(safe, safe))
+    roots = vectors * np.sqrt(np.maximum(values, 0)) * safe[:, None]
+    moves = random.normal(size=(draws, len(sds))) @ (found.design @ roots).T
+    shifts = random.uniform(0, 1, (draws, 1))
+    places = (found.state.volume_m3(rows.dip_m) + moves) / quantum_m3 + shifts
+    return (np.round(places) - places) * quantum_m3
+
+
 def scale_of_u(found, rows, quantum_m3):
     """(u,) what the standard deviations of the unknowns of a Fit are multiplied by; 1 or more.
 
@@ -44,14 +57,7 @@ def _by_steps(found, rows, quantum):
     if quantum <= 0 or found.dof <= 0:
         return np.ones(len(sds))
     gain = found.cofactor @ (found.design / rows.sd_m3[:, None] ** 2).T
-    random = np.random.default_rng(SEED)
-    safe = np.where(sds > 0, sds, 1.0)
-    values, vectors = np.linalg.eigh(found.cofactor / np.outer(safe, safe))
-    roots = vectors * np.sqrt(np.maximum(values, 0)) * safe[:, None]
-    moves = random.normal(size=(DRAWS, len(sds))) @ (found.design @ roots).T
-    shifts = random.uniform(0, 1, (DRAWS, 1))
-    places = (found.state.volume_m3(rows.dip_m) + moves) / quantum + shifts
-    errors = (np.round(places) - places) * quantum @ gain.T
+    errors = rounded_again(found, rows, quantum) @ gain.T
     moved = np.sqrt(np.mean(errors**2, axis=0))
     return np.maximum(moved / np.where(sds > 0, sds, np.inf), 1.0)
 

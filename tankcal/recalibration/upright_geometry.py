@@ -213,7 +213,9 @@ def _start(rows, heights, plates, modulus, zone):
 
 def _geometry(former, found, rows, used, seams_known):
     chosen = rows.of(used)
-    found = with_sure_fittings(chosen, _with_known_zero(chosen, former, found))
+    found = with_sure_fittings(
+        chosen, _with_known_zero(chosen, former, found), former.volume_quantum_m3
+    )
     found, other = _with_order(chosen, found)
     seams = found if "seams" in found.state.free else _free_seams(chosen, found)
     if seams is not None and (not seams_known or _are_elsewhere(found, seams)):

@@ -15,14 +15,17 @@ from tankcal.adjust import CRITICAL
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.recalibration.fittings import find_fittings, in_other_pairs
-from tankcal.recalibration.rounding import ROUGH
+from tankcal.recalibration.rounding import ROUGH, rounded_again, scale_of_u
 from tankcal.recalibration.table_fit import tried
 from tankcal.recalibration.zero import FARTHEST_M, find_zeros, move_seams
 
 SEAMS_FREE = "base", "density", "seams"
 LEAST_GAIN = 25.0  # of chi2 by a thing: less is what the best of all pairs gains by chance
 MOST_FITTINGS, FEW_FITTINGS = 12, 4
+DOUBTFUL_GAIN, CHANCES, MARGIN = 300.0, 8, 1.2  # of a thing that rounding may look like
+LEAST_SIZE = 3.0  # last digits of the table
 SAME_COST = 1.0
+LEAST_CHI2 = 0.8  # of a degree of freedom, by which no table is under
 SAME_SLOPES = 0.03, 0.15  # of the largest kink, that are none, when kinks are paired again
 LENGTHS_M = 1.0, 3.0, np.inf  # of things, in the order in which they are looked for
 USUAL_ZEROS_M = 0.0, -0.04, 0.04  # that are tried, too, where things are many
@@ -152,7 +155,8 @@ def _with_fittings(rows, state, at_most=MOST_FITTINGS):
     zeros = find_zeros(rows.dip_m, rows.volume_m3, rows.sd_m3, state.seams_m)
     best, tried = None, 0
     for zero in (state.zero_m,) if state.fittings else (zeros[0], *USUAL_ZEROS_M, *zeros[1:]):
-        other = _from_zero(rows.above(zero + NEAR_M), replace(state, zero_m=zero), at_most)
+        most = at_most if best is None else min(at_most, _most_fittings(best))
+        other = _from_zero(rows.above(zero + NEAR_M), replace(state, zero_m=zero), most)
         if other and (best is None or _cost(other) < _cost(best) - SAME_COST):
             best = other
         if best and _is_plain(best) and _is_by_rounding(best):
@@ -181,6 +185,11 @@ def _with_lower_rows(rows, found):
             if gain < len(chosen.dip_m) - len(found.left_m3) + SAME_ZERO**2:
                 return again
     return found
+
+
+def _most_fittings(best):
+    """How many things another Fit may have and still be the cheaper one."""
+    return max(int((_cost(best) - LEAST_CHI2 * best.dof) / LEAST_GAIN), 0)
 
 
 def _is_plain(found):
@@ -223,9 +232,15 @@ def _with_one_more(rows, found, longest, about):
             break
         more = replace(found.state, fittings=(*found.state.fittings, thing))
         again = _with_free_zero(rows, more, about)
-        if again and found.chi2 - again.chi2 > LEAST_GAIN:
+        if again and found.chi2 - again.chi2 > LEAST_GAIN and _are_large(rows, again):
             return again
     return None
+
+
+def _are_large(rows, found):
+    """Whether no thing is so small that two rounded digits explain it."""
+    least = LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
+    return all(abs(one.volume_m3) > least for one in found.state.fittings)
 
 
 def _tidied(rows, found, about):
@@ -241,20 +256,36 @@ def _tidied(rows, found, about):
     return found
 
 
-def with_sure_fittings(rows, found):
+def with_sure_fittings(rows, found, quantum_m3):
     """The Fit without things whose volume is no more than its uncertainty, the least sure first."""
     while found.state.fittings:
         things = found.state.fittings
-        sizes = np.abs([one.volume_m3 for one in things]) / found.sd("fittings")[2::3]
+        scale = scale_of_u(found, rows, quantum_m3)[found.state.layout["fittings"]]
+        sds = (found.sd("fittings") * scale)[2::3]
+        sizes = np.abs([one.volume_m3 for one in things]) / sds
         worst = int(np.argmin(sizes))
-        if sizes[worst] > CRITICAL:
-            break
         rest = things[:worst] + things[worst + 1 :]
         again = tried(rows, replace(found.state, fittings=rest))
-        if again is None:
+        rise = np.inf if again is None else again.chi2 - found.chi2
+        limit = 2 * LEAST_GAIN if sizes[worst] < CRITICAL else LEAST_GAIN
+        if limit < rise < DOUBTFUL_GAIN and quantum_m3 > 0:
+            limit = MARGIN * _gain_by_chance(again, rows, quantum_m3)
+        if rise > limit:
             break
         found = again
     return found
+
+
+def _gain_by_chance(found, rows, quantum):
+    """What a thing gains of chi2 because rounding goes on from row to row: the largest of draws."""
+    q = np.linalg.qr(found.design / rows.sd_m3[:, None])[0]
+    gains = []
+    for error in rounded_again(found, rows, quantum, CHANCES):
+        left = error / rows.sd_m3
+        left = (left - q @ (q.T @ left)) * rows.sd_m3
+        best = find_fittings(rows.dip_m, left, found.design, rows.sd_m3, most=1)
+        gains.append(best[0][1] if best else 0.0)
+    return max(gains)
 
 
 def _cheaper(rows, found, fittings, about):

@@ -18,13 +18,15 @@ HEIGHT_MISS_M, HEIGHT_MISS_RELATIVE = 0.020, 0.002
 SMALLEST_THICKNESS_MM = 1.0
 
 
+def no_courses():
+    """What is said of a courses.csv without rows."""
+    return message("no_courses", "no rows; expected one row for each course, from the bottom up")
+
+
 def check_courses(courses, values, log):
     """Course names once; plates of a credible thickness; heights that add up to the shell's."""
     if courses.is_empty:
-        log.problem(
-            courses.file,
-            message("no_courses", "no rows; expected one row for each course, from the bottom up"),
-        )
+        log.problem(courses.file, no_courses())
         return
     refuse_repeated(courses, "course", log)
     for row, thickness in zip(courses.rows, courses.of("thickness_mm"), strict=True):
