@@ -232,15 +232,18 @@ def _with_one_more(rows, found, longest, about):
             break
         more = replace(found.state, fittings=(*found.state.fittings, thing))
         again = _with_free_zero(rows, more, about)
-        if again and found.chi2 - again.chi2 > LEAST_GAIN and _are_large(rows, again):
+        if (
+            again
+            and found.chi2 - again.chi2 > LEAST_GAIN
+            and _is_large(rows, again.state.fittings[-1])
+        ):
             return again
     return None
 
 
-def _are_large(rows, found):
-    """Whether no thing is so small that two rounded digits explain it."""
-    least = LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
-    return all(abs(one.volume_m3) > least for one in found.state.fittings)
+def _is_large(rows, thing):
+    """Whether a thing is larger than what two rounded digits explain."""
+    return abs(thing.volume_m3) > LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
 
 
 def _tidied(rows, found, about):
