@@ -112,23 +112,58 @@ def _of_solid(found):
     yield _size(message("read_diameter", "diameter"), values["diameter"])
     if "length" in values:
         yield _size(message("read_length", "length of the cylinder"), values["length"])
-        ends = fit.ends.replace("_", " ")
-        yield message("read_ends", "ends: {ends}", ends=ends)
+        yield _ends(found, fit)
     if "end_depth" in values:
         yield _size(message("read_depth", "depth of the ends"), values["end_depth"])
     yield _size(message("read_zero_of_solid", "dips are less than the depth by"), values["zero"])
-    tilted = getattr(found, "tilted", None)
-    if tilted is not None:
-        tilt, u = (1000 * one for one in tilted["tilt"])
+    if getattr(found, "tilted", None) is not None:
+        yield from _tilt(found)
+    yield message(
+        "read_left_solid", "left: {rms} L (rms)", rms=fixed(1000 * fit.rms_m3, 2, marks())
+    )
+
+
+def _ends(found, fit):
+    from tankcal.recalibration.solid_geometry import TOLD_APART
+
+    ends = fit.ends.replace("_", " ")
+    others = [one for one in found.worse_by if one not in (fit.ends, *found.not_told_apart)]
+    if not others:
+        return message("read_ends", "ends: {ends}", ends=ends)
+    return message(
+        "read_ends_best",
+        "ends: {ends}; the next, {other}, raises chi2 by {by} ({limit} would be told)",
+        ends=ends,
+        other=others[0].replace("_", " "),
+        by=fixed(found.worse_by[others[0]], 0, marks()),
+        limit=fixed(TOLD_APART, 0, marks()),
+    )
+
+
+def _tilt(found):
+    tilt, u = (1000 * one for one in found.tilted["tilt"])
+    least, largest = (1000 * one for one in found.tilt_size)
+    if found.tilted is not found.best:
         yield message(
             "read_tilt",
-            "a tilt as one more unknown: {tilt} mm/m, u {u} mm/m; it lowers chi2 by {gain}",
+            "a tilt as one more unknown: {tilt} mm/m, u {u} mm/m; it lowers chi2 by {gain}, and "
+            "{least} to {largest} mm/m either way would fit",
             tilt=fixed(tilt, 2, marks()),
             u=fixed(u, 2, marks()),
             gain=fixed(found.tilt_gain, 1, marks()),
+            least=fixed(least, 1, marks()),
+            largest=fixed(largest, 1, marks()),
         )
+        return
+    other, zero = found.tilted.mirrored
     yield message(
-        "read_left_solid", "left: {rms} L (rms)", rms=fixed(1000 * fit.rms_m3, 2, marks())
+        "read_leaning",
+        "tilt: {tilt} mm/m, u {u} mm/m: no level tank explains the rows; {other} mm/m with dips "
+        "less by {zero} mm gives the same volumes",
+        tilt=fixed(tilt, 2, marks()),
+        u=fixed(u, 2, marks()),
+        other=fixed(1000 * other, 2, marks()),
+        zero=fixed(1000 * zero, 1, marks()),
     )
 
 

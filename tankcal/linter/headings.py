@@ -26,6 +26,7 @@ _STANDARD = re.compile("standard|padrao|estandar|tipica")
 _FACTOR = re.compile("coverage|abrangencia|cobertura")
 _OF_SOMETHING_ELSE = re.compile("radius|raio|radio|area|input|entrada|height|altura|dip")
 _COVERAGE = re.compile(r"\bk ?= ?(\d{1,2}(?:[.,]\d{1,4})?)", re.ASCII)
+_BOUND = re.compile("from|to|de|a|ate|desde|hasta")  # of an interval of volumes
 _RATE = re.compile(r"/ ?(mm|cm|dm|m|in|ft|pol)\b")
 _PARTS = re.compile("proportional|proporciona|interpola|milimetrica")
 
@@ -108,6 +109,11 @@ def heading_of(cell):
     height_unit, volume_unit = _unit(HEIGHT_UNITS_M, words), _unit(VOLUME_UNITS_M3, words)
     if _any(_ULLAGE, words):
         return Heading(text, "ullage", height_unit)
+    is_bound = any(map(_BOUND.fullmatch, words)) and all(
+        _BOUND.fullmatch(word) or _unit(VOLUME_UNITS_M3, [word]) for word in words
+    )
+    if is_bound:
+        return Heading(text, "", None)
     if _any(_VOLUME, words) or (volume_unit is not None and not _any(_HEIGHT, words)):
         return Heading(text, "volume", volume_unit)
     if _any(_HEIGHT, words) or height_unit is not None:

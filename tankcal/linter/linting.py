@@ -76,7 +76,6 @@ def _check_size(table, entries, low, high, main, log):
 
 _PART_OF_LARGEST = 0.5  # of its rows: smaller tables beside it are not capacity tables
 _ROWS_OF_SLOPE = 10
-_SAME_UNIT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -214,7 +213,7 @@ def checked(path, nominal=NOTHING_NOMINAL, sheet=None, declared=NO_UNITS, choose
     grids = read_grids(path, log)
     log.stop_if_problems()
     tables = _tables(path.name, grids, sheet, log, choose)
-    tables = [_declared(table, declared, log) for table in tables]
+    tables = [_declared(table, declared) for table in tables]
     longest = max(len(table.entries) for table in tables)
     summaries, areas, found = [], None, []
     for table in tables:
@@ -229,23 +228,13 @@ def checked(path, nominal=NOTHING_NOMINAL, sheet=None, declared=NO_UNITS, choose
     return Checked(report, tuple(found))
 
 
-def _declared(table, declared, log):
+def _declared(table, declared):
     """The table with units that were declared, where its headings name none."""
-    for key, heading in (("height_m", "height_unit_m"), ("volume_m3", "volume_unit_m3")):
-        size, said = getattr(declared, key), getattr(table, heading)
-        if size is not None and said is None:
-            table = replace(table, **{heading: size})
-        elif size is not None and abs(said / size - 1) > _SAME_UNIT:
-            unit = "m" if key == "height_m" else "m3"
-            expected = message(
-                "lint_other_unit",
-                "the heading says units of {said:g} {unit}; declared {declared:g} {unit}",
-                said=said,
-                declared=size,
-                unit=unit,
-            )
-            log.problem(table.name, expected)
-    return table
+    return replace(
+        table,
+        height_unit_m=table.height_unit_m or declared.height_m,
+        volume_unit_m3=table.volume_unit_m3 or declared.volume_m3,
+    )
 
 
 def _tables(file, grids, sheet, log, choose=None):

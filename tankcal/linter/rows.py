@@ -10,8 +10,10 @@ from tankcal.linter.linting import checked
 from tankcal.linter.totals import NO_UNITS, NOTHING_NOMINAL, likely_units
 from tankcal.messages import message
 
+_SAME_UNIT = 1e-6
 _SAME_TOP = 1e-3  # of height and volume: tables of one tank in two sheets
 _MOST_DIGITS = 6  # written after the mark: more are no rounding
+_SMALL_UNIT_M3, _THOUSANDS = 0.01, 3  # units of which nobody writes so many decimals
 _FEWEST_FOR_ROUNDING = 8  # rows
 
 
@@ -95,7 +97,7 @@ def read_rows(path, log, sheet=None, declared=NO_UNITS, volume_column=None):
         return None, found.report
     told = len(log.problems)
     one = _the_table(tables, volume_column, log)
-    if one is None or not _has_clear_units(one, log):
+    if one is None or not (_has_clear_units(one, declared, log) and _has_clear_marks(one, log)):
         return None, found.report
     rows = _rows(one, log)
     return (rows if len(log.problems) == told else None), found.report
@@ -171,8 +173,10 @@ def _in_si(one):
     return one.volumes.height * one.units.height_m, one.volumes.volume * one.units.volume_m3
 
 
-def _has_clear_units(one, log):
+def _has_clear_units(one, declared, log):
     """Whether headings name the units, or only one pair of units makes a tank of this table."""
+    if not _agrees_with_headings(one, declared, log):
+        return False
     if None not in (one.table.height_unit_m, one.table.volume_unit_m3):
         return True
     likely = likely_units(one.table, one.volumes)
@@ -185,6 +189,42 @@ def _has_clear_units(one, log):
         count=len(likely),
     )
     log.problem(one.table.name, expected)
+    return False
+
+
+def _agrees_with_headings(one, declared, log):
+    """Whether units that were declared are those of the headings, where these name any."""
+    told = len(log.problems)
+    said = (("m", one.table.height_unit_m, declared.height_m),
+            ("m3", one.table.volume_unit_m3, declared.volume_m3))  # fmt: skip
+    for unit, named, given in said:
+        if given is not None and abs(named / given - 1) > _SAME_UNIT:
+            expected = message(
+                "lint_other_unit",
+                "the heading says units of {said:g} {unit}; declared {declared:g} {unit}",
+                said=named,
+                declared=given,
+                unit=unit,
+            )
+            log.problem(one.table.name, expected)
+    return len(log.problems) == told
+
+
+def _has_clear_marks(one, log):
+    """Whether 1.327 is 1.327: three decimals of a litre rather look like thousands."""
+    entries = [entry for entry in one.series.entries if entry.volume.value]
+    is_typed = all(entry.volume.is_typed and not entry.volume.marks for entry in entries)
+    is_fine = one.units.volume_m3 < _SMALL_UNIT_M3
+    if not (is_typed and is_fine and all(e.volume.decimals == _THOUSANDS for e in entries)):
+        return True
+    expected = message(
+        "former_thousands",
+        "found {found} in a unit of {unit:g} m3, and three decimals in every row; expected volumes "
+        "without thousands marks: is that one?",
+        found=entries[0].volume.text,
+        unit=one.units.volume_m3,
+    )
+    log.problem(one.table.name, expected, entries[0].row, entries[0].volume_column)
     return False
 
 

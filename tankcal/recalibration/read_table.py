@@ -138,6 +138,13 @@ def _of_solid(found):
             "is by what they leave",
             rms=1000 * fit.rms_m3,
         )
+    if fit.below_bottom_m:
+        yield message(
+            "read_below_bottom",
+            "dips of the table count from {below:.3g} mm below the inside bottom; those of the job "
+            "count from the bottom: they are less by that",
+            below=1000 * fit.below_bottom_m,
+        )
     others = getattr(found, "not_told_apart", ())
     if others:
         yield message(

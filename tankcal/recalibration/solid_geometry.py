@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.recalibration.former import FormerTable
-from tankcal.tank.heads import End, depth_of
+from tankcal.tank.heads import End
 from tankcal.tank.solids import LyingTank, Sphere
 
 FEWEST_ROWS = 8
@@ -100,6 +100,15 @@ class SolidFit:
         """(value, u) of an unknown."""
         k = self.names.index(name)
         return float(self.values[k]), float(self.u[k])
+
+    @property
+    def below_bottom_m(self):
+        """How far the table's dips begin below the inside bottom; 0 where that is no more than u.
+
+        A job has no dip plate there: its dips are less than the table's by this.
+        """
+        zero, u = self["zero"]
+        return max(-zero, 0.0) if -zero > 3 * u else 0.0
 
     @property
     def mirrored(self):
@@ -251,7 +260,7 @@ def _again(rows, one, dip_from_a_m):
 
 
 def declared_sizes(fit: SolidFit) -> dict:
-    """The keys of [horizontal] or [sphere], and the dip plate, of a job with these sizes.
+    """The sections of a job.toml that hold the sizes: [horizontal] or [sphere], and [datum].
 
     Parameters
     ----------
@@ -260,9 +269,10 @@ def declared_sizes(fit: SolidFit) -> dict:
     Returns
     -------
     dict
-        {section: {key: value}}.
+        {section: {key: value}}. A zero below the bottom (`SolidFit.below_bottom_m`) becomes the
+        bottom.
     """
-    datum = {"datum": {"dip_plate_z_m": _rounded(fit["zero"][0])}}
+    datum = {"datum": {"dip_plate_z_m": _rounded(max(fit["zero"][0], 0.0))}}
     if fit.kind == "sphere":
         return {"sphere": {"diameter_m": _rounded(fit["diameter"][0])}} | datum
     tank = fit.tank
@@ -291,7 +301,7 @@ def declared_uncertainties(fit: SolidFit, former: FormerTable) -> list[dict]:
     Returns
     -------
     list of dict
-        With the keys input, u, unit, note; u in mm.
+        With the keys input, u, unit, note; sizes in mm.
     """
     units = {"zero": "datum", "diameter": "diameter", "length": "length", "end_depth": "end_depth"}
     rows = []
@@ -303,9 +313,11 @@ def declared_uncertainties(fit: SolidFit, former: FormerTable) -> list[dict]:
             share = former.U_m3[-1] / former.k / former.volume_m3[-1]
             power = 3 if fit.kind == "sphere" else 2
             u = float(np.hypot(u, value * share / power))
-            note = "read from a table: its rounding, and U of its last row"
+            note = "read from a table: its rounding and U of its last row"
         rows.append({"input": units[name], "u": float(f"{1e3 * u:.3g}"), "unit": "mm",
                      "note": note})  # fmt: skip
+    note = "sizes are at the reference temperature of the table"
+    rows.append({"input": "shell_temperature", "u": 0, "unit": "K", "note": note})
     return rows
 
 
@@ -494,6 +506,6 @@ def _rounded(value):
 
 
 __all__ = [
-    "ENDS", "LyingGeometry", "SolidFit", "declared_sizes", "declared_uncertainties", "depth_of",
-    "fit_lying", "fit_sphere",
+    "ENDS", "LyingGeometry", "SolidFit", "declared_sizes", "declared_uncertainties", "fit_lying",
+    "fit_sphere",
 ]  # fmt: skip

@@ -117,7 +117,8 @@ def job_of_solid(former, fit, *, tank_id):
         for key, value in keys.items():
             lines.append(f"{key} = {_text(value) if isinstance(value, str) else value}")
         lines.append("")
-    lines += ["[survey]", 'side = "inside"', f"date = {_day(former)}", ""]
+    lines += ["[survey]", 'side = "inside"', f"date = {_day(former)}"]
+    lines += [f"shell_temperature_c = {_temperature(former)}", ""]  # that the sizes are at
     texts = {"job.toml": "\n".join(lines)}
     rows = [
         ",".join(str(row[key]) for key in ("input", "u", "unit"))
