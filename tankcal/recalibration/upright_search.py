@@ -24,6 +24,7 @@ LEAST_GAIN = 25.0  # of chi2 by a thing: less is what the best of all pairs gain
 MOST_FITTINGS, FEW_FITTINGS = 12, 4
 DOUBTFUL_GAIN, CHANCES, MARGIN = 300.0, 8, 1.2  # of a thing that rounding may look like
 LEAST_SIZE = 3.0  # last digits of the table
+PRICE = 50.0  # of chi2, of a thing: what explains the rows at the lowest price is believed
 SAME_COST = 1.0
 LEAST_CHI2 = 0.8  # of a degree of freedom, by which no table is under
 SAME_SLOPES = 0.03, 0.15  # of the largest kink, that are none, when kinks are paired again
@@ -189,7 +190,7 @@ def _with_lower_rows(rows, found):
 
 def _most_fittings(best):
     """How many things another Fit may have and still be the cheaper one."""
-    return max(int((_cost(best) - LEAST_CHI2 * best.dof) / LEAST_GAIN), 0)
+    return max(int((_cost(best) - LEAST_CHI2 * best.dof) / PRICE), 0)
 
 
 def _is_plain(found):
@@ -205,7 +206,7 @@ def _is_plain(found):
 
 
 def _cost(found):
-    return found.chi2 + LEAST_GAIN * len(found.state.fittings)
+    return found.chi2 + PRICE * len(found.state.fittings)
 
 
 def _from_zero(rows, start, at_most):
@@ -232,15 +233,18 @@ def _with_one_more(rows, found, longest, about):
             break
         more = replace(found.state, fittings=(*found.state.fittings, thing))
         again = _with_free_zero(rows, more, about)
-        if again and found.chi2 - again.chi2 > LEAST_GAIN and _are_large(rows, again):
+        if (
+            again
+            and found.chi2 - again.chi2 > LEAST_GAIN
+            and _is_large(rows, again.state.fittings[-1])
+        ):
             return again
     return None
 
 
-def _are_large(rows, found):
-    """Whether no thing is so small that two rounded digits explain it."""
-    least = LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
-    return all(abs(one.volume_m3) > least for one in found.state.fittings)
+def _is_large(rows, thing):
+    """Whether a thing is larger than what two rounded digits explain."""
+    return abs(thing.volume_m3) > LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
 
 
 def _tidied(rows, found, about):
