@@ -8,6 +8,7 @@ import tankcal
 from tankcal.cli import (
     camera,
     comparing,
+    exporting,
     importing,
     linting,
     planning,
@@ -39,6 +40,7 @@ a new tank, step by step:
   tankcal read-table old.csv --courses courses.csv   radii and head out of a former table
   tankcal compare old.csv my-tank/results        has the tank changed since its former table?
   tankcal verify my-tank/results                 do the files of a run belong together?
+  tankcal export my-tank/results --profile NAME   the table as a gauging system takes it
 
 photographs, distances, angles and levels instead of surveyed points:
   tankcal new my-tank --survey photos          (or total-station) write such a job
@@ -111,7 +113,7 @@ def _parser():
     parser.set_defaults(command=None, shown=parser)
     commands = parser.add_subparsers(metavar="COMMAND")
 
-    tables = (linting, table_reading, comparing, verifying)
+    tables = (linting, table_reading, comparing, exporting, verifying)
     rooms = (running, reporting, starting, importing, planning, *tables, camera)
     for room in rooms:
         room.add(commands)

@@ -26,6 +26,11 @@ def add(commands):
         "record.json",
     )
     lint.add_argument("--sheet", metavar="NAME", help="of a workbook (default: the longest table)")
+    lint.add_argument(
+        "--uneven",
+        action="store_true",
+        help="the rows stand where they are needed (breakpoints), not at even steps",
+    )
     for name, unit, what in (
         ("volume", "M3", "volume the tank is meant to hold, m3"),
         ("diameter", "M", "inside diameter of an upright tank, m; with --nominal-height"),
@@ -46,7 +51,7 @@ def _lint(options):
         expected = message("nominal_height_too", "given without --nominal-height; expected both")
         raise InputError(Problem("--nominal-diameter", expected))
     nominal = Nominal(options.nominal_volume, options.nominal_diameter, options.nominal_height)
-    report = lint(options.file, nominal, options.sheet)
+    report = lint(options.file, nominal, options.sheet, not options.uneven)
     if options.machine:
         print_json(exit_status=2 if report.errors else 0, **_plain(report))
         return 2 if report.errors else 0

@@ -90,6 +90,16 @@ def shipped_rule(name):
     return rule
 
 
+def limits_one_table(rule):
+    """Whether a rule limits something of one table; rules of periods compare two."""
+    return bool(rule.uncertainty or rule.deviation)
+
+
+def rules_of_one_table():
+    """Names of the rules that ship with tankcal and that a job may name."""
+    return tuple(name for name in shipped_names() if limits_one_table(shipped_rule(name)))
+
+
 def named_rule(name, log):
     """(Rule, file name) of a shipped rule's name or the path of a file; None after telling `log`.
 
@@ -102,7 +112,8 @@ def named_rule(name, log):
         data = read_bytes(path, log, MAX_SETTINGS_BYTES)
         rule = None if data is None else parse_rule(path.name, data, log)
         return None if rule is None else (rule, path.name)
-    _tell_unknown("--rule", None, None, name, message("no_rule_file_there", "no such file"), log)
+    missing = message("no_rule_file_there", "no such file")
+    _tell_unknown("--rule", None, None, name, missing, shipped_names(), log)
     return None
 
 
@@ -120,7 +131,7 @@ def find_rule(raw, name, log):
     is_file_name = name.lower().endswith(_ENDING)
     if not (is_file_name and path.exists()):
         missing = message("no_rule_file", "no such file beside the job")
-        _tell_unknown(*place, name, missing, log)
+        _tell_unknown(*place, name, missing, rules_of_one_table(), log)
         return None
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
     rule = None if data is None else parse_rule(name, data, log)
@@ -129,7 +140,7 @@ def find_rule(raw, name, log):
 
 def _of_one_table(rule, file, place, log):
     """(Rule, file) of a rule that limits something of one table; None after telling `log`."""
-    if rule.uncertainty or rule.deviation:
+    if limits_one_table(rule):
         return rule, file
     expected = message(
         "rule_of_two_tables",
@@ -140,15 +151,15 @@ def _of_one_table(rule, file, place, log):
     return None
 
 
-def _tell_unknown(file, row, column, name, no_file, log):
+def _tell_unknown(file, row, column, name, no_file, rules, log):
     is_file_name = name.lower().endswith(_ENDING)
     missing = no_file if is_file_name else message("found_rule", "found {name!r}", name=name)
     expected = message(
         "no_such_rule",
         "{missing}; expected a .toml file there, or one of {rules}{hint}",
         missing=missing,
-        rules=[*shipped_names()],
-        hint=nearest(name.removesuffix(_ENDING), shipped_names()),
+        rules=[*rules],
+        hint=nearest(name.removesuffix(_ENDING), rules),
     )
     log.problem(file, expected, row, column)
 

@@ -31,8 +31,11 @@ class Series:
     rounding: np.ndarray
 
 
-def series_of(table, log):
-    """`Series` of a table; None after telling `log` that there are too few to judge."""
+def series_of(table, log, even_steps=True):
+    """`Series` of a table; None after telling `log` that there are too few to judge.
+
+    even_steps  False: rows stand where they are needed, and no step says that one is missing
+    """
     entries = [entry for entry in table.entries if _is_readable(table, entry, log)]
     if len(entries) < _FEWEST_ROWS:
         expected = message(
@@ -80,7 +83,8 @@ def series_of(table, log):
         )
         return None
     teller = _Teller(table, entries, height, direction, log)
-    height = _even_steps(teller, step, tolerance)
+    if even_steps:
+        height = _even_steps(teller, step, tolerance)
     rounding = _rounding(entries, height, tolerance)
     return Series(tuple(entries), height, direction, step, rounding)
 

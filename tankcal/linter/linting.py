@@ -144,19 +144,25 @@ class Report:
 
 
 def lint(
-    path: str | PathLike, nominal: Nominal = NOTHING_NOMINAL, sheet: str | None = None
+    path: str | PathLike,
+    nominal: Nominal = NOTHING_NOMINAL,
+    sheet: str | None = None,
+    even_steps: bool = True,
 ) -> Report:
     """Examine the capacity table in a file.
 
     Parameters
     ----------
     path : path
-        A CSV file, an Excel workbook (.xlsx), a PDF with the table as text (with the extra
-        `tankcal[pdf]`), or a record.json of tankcal.
+        A CSV file, an Excel workbook (.xlsx), a PDF with the table as text, or a record.json of
+        tankcal.
     nominal : Nominal, optional
         Nominal tank to compare total and last row with.
     sheet : str, optional
         Name of the sheet; None: the one with the longest table.
+    even_steps : bool, optional
+        False: the rows stand where they are needed (breakpoints), not at even steps; then none is
+        missing and no height is odd.
 
     Returns
     -------
@@ -181,7 +187,7 @@ def lint(
     >>> print(report.findings[0].problem.expected)
     found 18 after 19; expected volumes that do not fall
     """
-    return checked(path, nominal, sheet).report
+    return checked(path, nominal, sheet, even_steps=even_steps).report
 
 
 @dataclass(frozen=True)
@@ -202,7 +208,14 @@ class Checked:
     tables: tuple[CheckedTable, ...]
 
 
-def checked(path, nominal=NOTHING_NOMINAL, sheet=None, declared=NO_UNITS, choose=None):
+def checked(
+    path,
+    nominal=NOTHING_NOMINAL,
+    sheet=None,
+    declared=NO_UNITS,
+    choose=None,
+    even_steps=True,
+):
     """`Checked` tables of a file, as `lint` examines them.
 
     declared  Units (None for what is not) of columns whose headings name none
@@ -218,7 +231,7 @@ def checked(path, nominal=NOTHING_NOMINAL, sheet=None, declared=NO_UNITS, choose
     summaries, areas, found = [], None, []
     for table in tables:
         if len(table.entries) >= _PART_OF_LARGEST * longest:
-            one, summary, areas = _check(table, nominal, log)
+            one, summary, areas = _check(table, nominal, log, even_steps)
             summaries.append(summary)
             found.append(one)
     for table in tables:
@@ -271,7 +284,7 @@ def _tables(file, grids, sheet, log, choose=None):
     return tables
 
 
-def _check(table, nominal, log):
+def _check(table, nominal, log, even_steps):
     """(CheckedTable, summary, (least, largest) area in m2) of one table, its faults told."""
     if not table.has_heading:
         log.warning(
@@ -280,7 +293,7 @@ def _check(table, nominal, log):
                 "lint_no_heading", "no heading: taken as heights in column 1, volumes in column 2"
             ),
         )
-    series = series_of(table, log)
+    series = series_of(table, log, even_steps)
     volumes = volumes_of(table, series, log) if series else None
     if volumes is None:
         return CheckedTable(table, series, None, None), "", None

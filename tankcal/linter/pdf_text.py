@@ -7,7 +7,6 @@ import contextlib
 import json
 import subprocess
 import sys
-from importlib.util import find_spec
 
 from tankcal.messages import message
 
@@ -23,14 +22,6 @@ _CODE = (
 
 def pages_of(path, log):
     """Tuple of the text of each page, laid out; None after telling `log` why there is none."""
-    if find_spec("pypdf") is None:
-        expected = message(
-            "lint_no_pypdf",
-            "reading a PDF takes pypdf, which is not installed; expected pip install "
-            "'tankcal[pdf]', or the table as CSV or workbook",
-        )
-        log.problem(path.name, expected)
-        return None
     kind, said = _asked_child(path)
     if kind == PAGES and any(page.strip() for page in said):
         return tuple(said)

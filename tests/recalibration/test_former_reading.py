@@ -340,13 +340,6 @@ def test_spoilt_files_are_read_or_refused(tmp_path):
         assert np.all(np.diff(former.height_m) > 0)
 
 
-def test_without_pypdf_a_pdf_is_one_line(monkeypatch, tmp_path):
-    monkeypatch.setattr("tankcal.linter.pdf_text.find_spec", lambda name: None)
-    (tmp_path / "old.pdf").write_bytes(b"%PDF-1.4\n")
-    (line,) = refusal(tmp_path / "old.pdf")
-    assert "tankcal[pdf]" in line
-
-
 @pytest.mark.slow
 def test_a_scanned_pdf_is_one_line(tmp_path):
     (line,) = refusal(pdf_of([[]], tmp_path / "old.pdf"))

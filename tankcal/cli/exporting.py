@@ -1,0 +1,151 @@
+"""`tankcal export`: files for gauging and inventory systems, from a record."""
+
+import re
+from contextlib import suppress
+from pathlib import Path
+
+from tankcal.cli.arguments import add_language, parse_list, positive
+from tankcal.cli.machine import add_json, print_json
+from tankcal.cli.showing import language_of_run, prepare_for_small_work, say, speak
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+
+
+def add(commands):
+    """The parser of `tankcal export`."""
+    parser = commands.add_parser(
+        "export",
+        help="write a table for a gauging or inventory system",
+        description="Write the capacity table of a record as a gauging or inventory system takes "
+        "it, by a profile: the rows that err least where it takes only few, each rounded once, "
+        "read back by the linter. The report beside the file (NAME-report.txt) says how far off "
+        "what the system reads is at most. docs/exports.md has the profiles.",
+        epilog="exit status: 0 done; 2 the record, the profile or the options must be mended (one "
+        "line per problem; nothing is written then).",
+    )
+    parser.add_argument(
+        "record", metavar="RECORD", nargs="?", help="a record.json, or a folder of results"
+    )
+    parser.add_argument(
+        "--profile", metavar="NAME", help="one of --list, or a TOML file of your own"
+    )
+    parser.add_argument("--list", action="store_true", help="show the profiles there are")
+    most = parser.add_mutually_exclusive_group()
+    most.add_argument(
+        "--points", metavar="K", type=parse_list, help="rows at most: those that err least"
+    )
+    most.add_argument(
+        "--max-error-l",
+        metavar="LITRES",
+        type=positive,
+        help="the fewest rows that err by no more, in litres",
+    )
+    parser.add_argument(
+        "--gauge-on-shell",
+        action="store_true",
+        help="the gauge hangs on the shell: work out HyTD, by which its reference is drawn down",
+    )
+    parser.add_argument(
+        "--out", metavar="FILE", help="where to write (default: TANK-PROFILE.csv here)"
+    )
+    add_language(parser)
+    add_json(parser)
+    parser.set_defaults(command=_export)
+
+
+def _export(options):
+    prepare_for_small_work()
+    speak(options.language)
+    if options.list:
+        return _list(options)
+    _refuse_missing(options)
+    from tankcal.exports.exporting import export_record, write_export
+    from tankcal.exports.profiles import find_profile
+    from tankcal.report.outputs import record_file
+
+    source, error = record_file(options.record), options.max_error_l
+    _speak_as(options, source)
+    profile, language = find_profile(options.profile), language_of_run()
+    export = export_record(
+        source, profile, points=options.points,
+        max_error_m3=None if error is None else error / 1000,
+        hangs_on_shell=options.gauge_on_shell, language=language,
+    )  # fmt: skip
+    paths = write_export(export, _out(options, export, source), language)
+    if options.machine:
+        print_json(
+            exit_status=0, points=len(export.dip_m), error_l=1000 * export.error_m3,
+            at_m=export.at_m, report=list(map(str, export.lines)), files=list(map(str, paths)),
+        )  # fmt: skip
+        return 0
+    for line in export.lines:
+        say(line)
+    for path in paths:
+        print(f"  {path}")
+    return 0
+
+
+def _refuse_missing(options):
+    record = message(
+        "export_needs_record", "missing; expected a record.json or a folder of results"
+    )
+    profile = message(
+        "export_needs_profile",
+        "missing; expected one of those that tankcal export --list shows, or a .toml file",
+    )
+    needed = (("RECORD", options.record, record), ("--profile", options.profile, profile))
+    missing = [Problem(name, text) for name, given, text in needed if given is None]
+    if missing:
+        raise InputError(missing)
+
+
+def _speak_as(options, source):
+    """Speak the language that is asked for, else that of the record's job."""
+    from tankcal.record import load
+    from tankcal.text.languages import nearest_language
+
+    if options.language is None:
+        with suppress(InputError, AttributeError, KeyError, TypeError):
+            speak(nearest_language(load(source)["job"]["table"]["language"]))
+
+
+def _out(options, export, source):
+    """The file to write: as asked, or named by the tank and the profile, in this folder."""
+    if options.out is not None:
+        out = Path(options.out)
+        if (
+            out.is_dir()
+            or out.suffix in ("", ".json", ".toml")
+            or out.resolve() == source.resolve()
+        ):
+            text = message(
+                "export_out", "expected the name of a file with an ending such as {ending}, that "
+                "is neither a folder, a record nor a profile", ending=export.profile.ending,
+            )  # fmt: skip
+            raise InputError(Problem("--out", text))
+        return out
+    tank = re.sub(r"[^\w.()-]+", "_", export.tank).strip("._") or "tank"
+    return Path(f"{tank}-{export.profile.code}{export.profile.ending}")
+
+
+def _list(options):
+    """The profiles that ship: name, system, points, whether it was verified."""
+    from tankcal.exports.profiles import shipped_profiles
+
+    profiles = shipped_profiles()
+    if options.machine:
+        print_json(exit_status=0, profiles=[
+            {"profile": code, "name": one.name, "max_points": one.max_points,
+             "verified": one.verified, "source": one.source} for code, one in profiles.items()
+        ])  # fmt: skip
+        return 0
+    for code, one in profiles.items():
+        points = message("export_any_points", "any number of rows")
+        if one.max_points:
+            points = message("export_most_points", "{most} rows at most", most=one.max_points)
+        known = message("export_unverified", "not verified")
+        if one.verified:
+            known = message("export_verified", "verified")
+        say(message("export_listed", "{profile} {name}: {points}; {known}",
+                    profile=code.ljust(26), name=one.name, points=points, known=known))  # fmt: skip
+    return 0

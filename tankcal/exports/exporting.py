@@ -1,0 +1,194 @@
+"""The export of a record: which rows, how far off, written by a profile and read back."""
+
+import hashlib
+import os
+from dataclasses import dataclass
+from errno import EISDIR
+from pathlib import Path
+
+import numpy as np
+
+from tankcal import record as records
+from tankcal.exports.choosing import Asked
+from tankcal.exports.facts import facts_of, report_of
+from tankcal.exports.marks import ON_THE_MARK_M
+from tankcal.exports.shell_movement import GaugeCorrection, gauge_correction
+from tankcal.exports.writing import body_of, file_text, read_back
+from tankcal.job.tables import Log
+from tankcal.messages import message
+from tankcal.text.words import load_words, say
+
+
+@dataclass(frozen=True)
+class Export:
+    """A table as a system will read it, with what that costs.
+
+    Attributes
+    ----------
+    profile : Profile
+    tank : str
+        Its name.
+    dip_m, volume_m3 : (points,) ndarray
+        What the system makes of the rows of the file, ascending.
+    rows : int
+        Of the table in the record.
+    error_m3 : float
+        Bound of the distance of what the system reads from the exact volume at any dip: rounding,
+        the line or spline, and `own_m3`.
+    at_m : float
+        Dip where it is reached (but for own_m3).
+    own_m3 : float
+        Largest error of straight lines between the rows of the record, as the record states it.
+    rounded_levels : int
+        Rows whose level is not the row's own, for the profile has no such mark.
+    gauge : GaugeCorrection or None
+        HyTD of a gauge that hangs on the shell.
+    facts : tuple of Message
+        Provenance.
+    data : bytes
+        The file.
+    """
+
+    profile: object
+    tank: str
+    dip_m: np.ndarray
+    volume_m3: np.ndarray
+    rows: int
+    error_m3: float
+    at_m: float
+    own_m3: float
+    rounded_levels: int
+    gauge: GaugeCorrection | None
+    facts: tuple
+    data: bytes
+
+    @property
+    def lines(self):
+        """Messages: what the report says of the export."""
+        return report_of(self)
+
+
+def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_shell=False,
+                  language="en"):  # fmt: skip
+    """The `Export` of the table in a record.
+
+    Parameters
+    ----------
+    source : path
+        A record.json.
+    profile : Profile
+    points : int, optional
+        Rows of the file at most: those that err least are taken.
+    max_error_m3 : float, optional
+        The fewest rows that err by no more.
+    hangs_on_shell : bool, optional
+        Whether the gauge hangs on the shell: then HyTD is worked out.
+    language : str, optional
+        Of the lines of provenance.
+
+    Raises
+    ------
+    InputError
+        With every reason why the profile cannot take the table.
+    """
+    path, log = Path(source), Log()
+    record = records.read(path)
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    _check_table(path.name, record, log)
+    log.stop_if_problems()
+    asked = Asked(path.name, record, profile, points, max_error_m3, log)
+    marks, fixed = asked.marks()
+    gauge = _gauge(path.name, record, log) if hangs_on_shell else None
+    log.stop_if_problems()
+    rows, error, at = asked.chosen(marks, fixed)
+    log.stop_if_problems()
+    listed = rows[1:] if asked.is_zero_left_out else rows
+    asked.refuse_limits(marks, listed)
+    log.stop_if_problems()
+    height, reference = asked.height, record.job.datum.reference_height_m
+    body = body_of(listed.tolist(), height, marks, profile, reference)
+    facts, words = facts_of(record, digest), load_words(language)
+    values = {
+        "tank": record.job.tank.id, "number": str(record.job.certificate.get("number") or ""),
+        "date": record.job.survey.date or "", "points": str(len(listed)),
+        "level_unit": profile.increment if profile.leading == "increments" else profile.level_unit,
+        "volume_unit": profile.volume_unit,
+    }  # fmt: skip
+    text = file_text(body, profile, [say(words, one) for one in facts], values)
+    data = text.encode(profile.encoding)
+    own, off_mark = asked.own_m3, np.abs(marks.at_m[listed] - height[listed]) > ON_THE_MARK_M
+    read_back(
+        data,
+        body,
+        profile,
+        len(listed) == len(height) and not np.any(off_mark),
+        int(off_mark.sum()),
+    )
+    return Export(
+        profile, record.job.tank.id, marks.at_m[listed], marks.written_m3[listed], len(height),
+        error + own, at, own, int(off_mark.sum()), gauge, tuple(facts), data,
+    )  # fmt: skip
+
+
+def write_export(export, out, language="en"):
+    """Write the file and its report beside it (NAME-report.txt), both or none; their paths."""
+    out, words = Path(out), load_words(language)
+    report = out.with_name(f"{out.stem}-report.txt")
+    lines = [say(words, one) for one in (*export.lines, *export.facts)]
+    made = {out: export.data, report: "".join(f"{one}\n" for one in lines).encode()}
+    waiting = {}
+    for path in made:
+        if path.is_dir():  # told before anything is written
+            raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(path))
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        for path, data in made.items():
+            waiting[path] = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+            waiting[path].write_bytes(data)
+        for path, temporary in waiting.items():
+            temporary.replace(path)
+    finally:
+        for temporary in waiting.values():
+            temporary.unlink(missing_ok=True)
+    return [*made]
+
+
+def _check_table(file, record, log):
+    """Tell why a record has no table that can be exported."""
+    if record.capacity is None:
+        text = message("export_no_table", "has no capacity table: its survey was only adjusted")
+        log.problem(file, text, None, "capacity")
+        return
+    height, volume = np.array(record.capacity.height_m), np.array(record.capacity.volume_m3)
+    if len(height) != len(volume) or len(height) < 2 or np.any(np.diff(height) <= 0):
+        text = message("export_bad_heights", "heights that do not rise row by row; expected two "
+                       "rows or more that do, with a volume each")  # fmt: skip
+        log.problem(file, text, None, "capacity.height_m")
+    elif np.any(np.diff(volume) < 0):
+        row = int(np.argmax(np.diff(volume) < 0)) + 1
+        text = message("export_falls", "the volume falls at the dip {at:.6g} m; expected volumes "
+                       "that do not fall", at=float(height[row]))  # fmt: skip
+        log.problem(file, text, None, "capacity.volume_m3")
+    columns = ("k", "stated_U_m3")
+    if any(len(getattr(record.capacity, one)) != len(height) for one in columns):
+        text = message("export_columns", "columns of different lengths; expected one value a row")
+        log.problem(file, text, None, "capacity.stated_U_m3")
+
+
+def _gauge(file, record, log):
+    """The `GaugeCorrection` of the record's shell; None after telling why there is none."""
+    head = next((one.value for one in record.choices if one.code == "head"), None)
+    courses = [(one.height_m, one.thickness_m, one.inside_radius_m) for one in record.courses]
+    if not courses or min(thickness for _, thickness, _ in courses) <= 0:
+        text = message("export_no_plates", "has no courses with the thickness of their plates; "
+                       "expected them for --gauge-on-shell")  # fmt: skip
+        log.problem(file, text, None, "courses")
+        return None
+    if not isinstance(head, int | float) or head <= 0:
+        text = message("export_no_density", "its table has no head of a liquid; expected one with "
+                       "the density of the liquid for --gauge-on-shell")  # fmt: skip
+        log.problem(file, text, None, "job.table.liquid_density_kg_m3")
+        return None
+    zero = record.capacity.zero_m
+    top = record.capacity.height_m[-1]
+    return gauge_correction(top, courses, float(head), record.job.material.e_pa, zero)

@@ -1,0 +1,102 @@
+"""The rows of a table as a profile writes them: whole numbers of quanta, each rounded once."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import floor
+
+import numpy as np
+
+from tankcal.exports.profiles import INCREMENTS_M
+
+ON_THE_MARK_M = 1e-8
+_MOSTLY = 0.5  # of the rows that lie on marks of the profile: then only these may stand
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Rows of a table as whole numbers of the profile's last digits.
+
+    Attributes
+    ----------
+    level, volume : (rows,) list of int
+        Quanta of the leading column of levels, and of volumes, offsets taken off.
+    at_m, written_m3 : (rows,) ndarray
+        Dip and volume that a system makes of them.
+    stands : (rows,) ndarray of bool
+        Rows that may stand: on a mark where most are, and no two with the same level.
+    """
+
+    level: list
+    volume: list
+    at_m: np.ndarray
+    written_m3: np.ndarray
+    stands: np.ndarray
+
+
+def to_quanta(value, quantum):
+    """The whole number of quanta nearest to a number, exactly; halves go up.
+
+    Examples
+    --------
+    >>> to_quanta(5.5, Fraction(1, 100)), to_quanta(0.0004999, Fraction(1, 1000))
+    (550, 0)
+    """
+    over, under = float(value).as_integer_ratio()
+    over, under = over * quantum.denominator, under * quantum.numerator
+    return (2 * over + under) // (2 * under)
+
+
+def increments_of(height_m, increment):
+    """A height as a whole number of increments, such as "1/16 in".
+
+    Examples
+    --------
+    >>> from tankcal.tank.dips import parse_dip
+    >>> increments_of(parse_dip("5 ft 3 3/16 in", "ft-in-16"), "1/16 in")
+    1011
+    >>> increments_of(5.5, "1/100 m")
+    550
+    """
+    return to_quanta(height_m, INCREMENTS_M[increment])
+
+
+def marks_of(height_m, volume_m3, profile, reference_m=None, must=()):
+    """`Marks` of a table in a profile.
+
+    reference_m  height that ullages count from         must  rows that stand before all others
+    """
+    quantum, volume_quantum = profile.level_quantum_m, profile.volume_quantum_m3
+    is_ullage = profile.leading == "ullage"
+    level_offset = Fraction(str(profile.level_offset_m))
+    volume_offset = Fraction(str(profile.volume_offset_m3))
+    levels = reference_m - height_m if is_ullage else height_m
+    level = _quanta(levels, quantum, level_offset)
+    volume = _quanta(volume_m3, volume_quantum, volume_offset)
+    at = np.array([float(n * quantum + level_offset) for n in level])
+    at = reference_m - at if is_ullage else at
+    written = np.array([float(n * volume_quantum + volume_offset) for n in volume])
+    return Marks(level, volume, at, written, _standing(height_m, at, level, must))
+
+
+def _quanta(values, quantum, offset):
+    if offset == 0:
+        return [to_quanta(one, quantum) for one in values.tolist()]
+    half = Fraction(1, 2)
+    return [floor((Fraction(one) - offset) / quantum + half) for one in values.tolist()]
+
+
+def _standing(height_m, at_m, level, must):
+    """(rows,) which rows may stand."""
+    off = np.abs(at_m - height_m)
+    on_mark = off <= ON_THE_MARK_M
+    stands = on_mark.copy() if on_mark.mean() >= _MOSTLY else np.ones(len(off), dtype=bool)
+    stands[list(must)] = True
+    off[list(must)] = -1.0  # stands before all others of its level
+    best = {}
+    for row in np.flatnonzero(stands):
+        n = level[row]
+        if n not in best or off[row] < off[best[n]]:
+            best[n] = row
+    kept = np.zeros(len(off), dtype=bool)
+    kept[list(best.values())] = True
+    return kept

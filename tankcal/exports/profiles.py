@@ -1,0 +1,360 @@
+"""Profiles of gauging and inventory systems: what a file for one of them is like (TOML).
+
+`[profile]` says what it is for and where that was read, `[table]` which rows and columns,
+`[levels]` and `[volumes]` how these are written, `[file]` what stands between and above them.
+docs/exports.md has every key.
+"""
+
+import string
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from tankcal.errors import InputError, Problem
+from tankcal.job.contract.shorthand import choice, number
+from tankcal.job.entries import read_section
+from tankcal.job.fields import Field
+from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
+from tankcal.job.tables import Log, nearest, read_bytes, shown
+from tankcal.messages import message
+from tankcal.tank.dips import METRES_PER_INCH, VOLUME_UNITS_M3
+from tankcal.text.shipped import shipped_folder
+
+_PARTS_OF_INCH = {"in": 1, "1/2 in": 2, "1/4 in": 4, "1/8 in": 8, "1/16 in": 16}
+INCREMENTS_M = {
+    "m": Fraction(1),
+    "dm": Fraction(1, 10),
+    "cm": Fraction(1, 100),
+    "mm": Fraction(1, 1000),
+    "1/100 m": Fraction(1, 100),
+    "ft": 12 * METRES_PER_INCH,
+    **{name: METRES_PER_INCH / part for name, part in _PARTS_OF_INCH.items()},
+}
+MARKED = {"ft-in-8": METRES_PER_INCH / 8, "ft-in-16": METRES_PER_INCH / 16}  # 3' 4 5/8"
+LEVEL_UNITS_M = {name: INCREMENTS_M[name] for name in ("m", "cm", "mm", "ft", "in")} | MARKED
+VOLUMES_M3 = VOLUME_UNITS_M3 | {
+    "hL": Fraction(1, 10),
+    "gal": 231 * METRES_PER_INCH**3,
+    "ft3": (12 * METRES_PER_INCH) ** 3,
+}
+LEVEL_COLUMNS = ("dip", "ullage", "increments")
+VOLUME_COLUMNS = ("volume", "increment_volume")
+LINE_ENDS = {"lf": "\n", "crlf": "\r\n"}
+PLACEHOLDERS = ("tank", "number", "level_unit", "volume_unit", "date", "points")
+MOST_POINTS, MOST_LINES = 100_000, 40
+
+FIELDS = {
+    "profile": (
+        Field("name", "text", "name of the system", required=True),
+        Field("source", "text", "where this was read", required=True),
+        Field("verified", "flag", "whether it was read in the system's own text"),
+        Field("remark", "text", "anything that is to stand beside it"),
+    ),
+    "table": (
+        choice("grid", "which rows", ("every row", "step", "breakpoints"), required=True),
+        number("step_m", "from row to row, where grid is step", 0, 100, above_low=True),
+        number("min_points", "fewest rows that the system takes", 1, MOST_POINTS),
+        number("max_points", "most rows that the system takes", 1, MOST_POINTS),
+        choice("interpolation", "how the system reads between rows", ("linear", "spline")),
+        choice("order", "of the rows by level", ("ascending", "descending")),
+        choice("zero_row", "whether dip 0 has a row", ("free", "required", "forbidden")),
+        number("level_offset_m", "what the system adds to every level", -1000, 1000),
+        number("volume_offset_m3", "what the system adds to every volume", -1e6, 1e6),
+    ),
+    "levels": (
+        choice("unit", "unit of dips and ullages", tuple(LEVEL_UNITS_M)),
+        number("decimals", "decimals of dips and ullages", 0, 6),
+        choice("increment", "what the column increments counts", tuple(INCREMENTS_M)),
+    ),
+    "volumes": (
+        choice("unit", "unit of volumes", tuple(VOLUMES_M3), required=True),
+        number("decimals", "decimals of volumes", 0, 6, required=True),
+        number("digits", "most digits of a volume, decimals too", 1, 15),
+        number("largest", "largest volume that the system takes, in its unit", 0, above_low=True),
+    ),
+    "file": (
+        choice("separator", "between the columns", (",", ";", "\t", " ", "|")),
+        choice("decimal", "mark of decimals", (".", ",")),
+        choice("thousands", "mark between thousands", ("", ",", ".", " ", "'")),
+        choice("line_end", "of every line", tuple(LINE_ENDS)),
+        choice("encoding", "of the text", ("utf-8", "utf-8-sig", "cp1252", "ascii")),
+        choice("ending", "of the file's name", (".csv", ".txt", ".tab", ".dat", ".prn")),
+        Field("comment", "text", "what a line of provenance begins with"),
+        Field("provenance", "flag", "whether lines of provenance stand above the rows"),
+    ),
+}  # fmt: skip
+LISTS = {("table", "columns"): True, ("file", "headings"): False, ("file", "header"): False}
+_FOLDER, _ENDING = "exports/shipped_profiles", ".toml"
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What a file for a system is like; the keys of its file, with what is usual filled in.
+
+    Attributes
+    ----------
+    code : str
+        Name of the profile's file without its ending.
+    step_m : float or None
+        From row to row, where grid is "step".
+    min_points, max_points : int or None
+        None: no limit is known.
+    largest : float or None
+        Largest volume, in the unit of volumes.
+    """
+
+    code: str
+    name: str
+    source: str
+    columns: tuple[str, ...]
+    grid: str
+    volume_unit: str
+    volume_decimals: int
+    verified: bool = False
+    remark: str = ""
+    step_m: float | None = None
+    min_points: int | None = None
+    max_points: int | None = None
+    interpolation: str = "linear"
+    order: str = "ascending"
+    zero_row: str = "free"
+    level_offset_m: float = 0.0
+    volume_offset_m3: float = 0.0
+    level_unit: str = "m"
+    level_decimals: int = 3
+    increment: str | None = None
+    digits: int | None = None
+    largest: float | None = None
+    separator: str = ","
+    decimal: str = "."
+    thousands: str = ""
+    line_end: str = "lf"
+    encoding: str = "utf-8"
+    ending: str = ".csv"
+    comment: str = "#"
+    provenance: bool = True
+    headings: tuple[str, ...] = ()
+    header: tuple[str, ...] = ()
+
+    @property
+    def leading(self):
+        """The column of levels that the others follow: dip, ullage or increments."""
+        return next(one for one in self.columns if one in LEVEL_COLUMNS)
+
+    @property
+    def level_quantum_m(self):
+        """Value of the last digit of a level, m, as a Fraction."""
+        if self.leading == "increments":
+            return INCREMENTS_M[self.increment]
+        if self.level_unit in MARKED:
+            return MARKED[self.level_unit]
+        return LEVEL_UNITS_M[self.level_unit] / 10**self.level_decimals
+
+    @property
+    def volume_quantum_m3(self):
+        """Value of the last digit of a volume, m3, as a Fraction."""
+        return VOLUMES_M3[self.volume_unit] / 10**self.volume_decimals
+
+
+def shipped_profiles():
+    """{name: Profile} of the profiles that ship with tankcal."""
+    paths = sorted(shipped_folder(_FOLDER).glob(f"*{_ENDING}"))
+    return {path.stem: _read(path) for path in paths}
+
+
+def find_profile(name):
+    """The Profile of a name that ships with tankcal, or of a TOML file.
+
+    Raises InputError with every problem of the file, or with the names there are.
+    """
+    shipped = shipped_folder(_FOLDER) / f"{name}{_ENDING}"
+    if "/" not in name and "\\" not in name and shipped.is_file():
+        return _read(shipped)
+    if name.lower().endswith(_ENDING):
+        return _read(Path(name))
+    names = [path.stem for path in sorted(shipped_folder(_FOLDER).glob(f"*{_ENDING}"))]
+    expected = message(
+        "export_no_profile",
+        "no profile {name!r}{hint}; expected a .toml file, or one of {names}",
+        name=name[:60], hint=nearest(name, names), names=names,
+    )  # fmt: skip
+    raise InputError(Problem("--profile", expected))
+
+
+def _read(path):
+    log = Log()
+    data = read_bytes(path, log, MAX_SETTINGS_BYTES)
+    profile = None if data is None else parse_profile(path.name, data, log)
+    log.stop_if_problems()
+    return profile
+
+
+def parse_profile(file, data, log):
+    """The Profile in the bytes of a TOML file, or None after telling `log` every problem of it."""
+    told = len(log.problems)
+    settings, sections = read_toml(file, data, log)
+    if settings is None:
+        return None
+    for section in [one for one in settings if one not in FIELDS]:
+        text = message(
+            "export_section", "unknown section; expected one of {names}{hint}",
+            names=list(FIELDS), hint=nearest(section, FIELDS),
+        )  # fmt: skip
+        log.problem(file, text, sections.get(section), f"[{section}]")
+    values = {}
+    for section, fields in FIELDS.items():
+        given, row = dict(settings.get(section, {})), sections.get(section)
+        for (_, key), needed in (one for one in LISTS.items() if one[0][0] == section):
+            place = (file, f"{section}.{key}")
+            values[section, key] = _texts(*place, given.pop(key, None), row, needed, log)
+        read = read_section(file, section, fields, given, row, log)
+        values |= {(section, key): value for key, value in read.items()}
+    tell = _Teller(file, settings, sections, log)
+    _check_columns(values, tell)
+    _check_table(values, tell)
+    _check_marks(values, tell)
+    return _profile(file, values) if len(log.problems) == told else None
+
+
+def _texts(file, name, value, row, needed, log):
+    """Tuple of texts of a list, () where there is none."""
+    raw = None if value is None else value.raw
+    if raw is None or raw == []:
+        if needed:
+            log.problem(file, message("export_no_list", "missing; expected a list of texts"),
+                        row, name)  # fmt: skip
+        return ()
+    sound = isinstance(raw, list) and len(raw) <= MOST_LINES
+    if not sound or not all(isinstance(one, str) and one.isprintable() and len(one) <= 300
+                            for one in raw):  # fmt: skip
+        text = message(
+            "export_texts", "found {found}; expected a list of at most {most} texts, each of one "
+            "line", found=shown(raw), most=MOST_LINES,
+        )  # fmt: skip
+        log.problem(file, text, value.row or row, name)
+        return ()
+    return tuple(raw)
+
+
+class _Teller:
+    """Tells what is wrong with a key of the profile, in its row."""
+
+    def __init__(self, file, settings, sections, log):
+        self.file, self.settings, self.sections, self.log = file, settings, sections, log
+
+    def __call__(self, section, key, text):
+        value = self.settings.get(section, {}).get(key)
+        row = self.sections.get(section) if value is None else value.row
+        self.log.problem(self.file, text, row, f"{section}.{key}")
+
+
+def _check_columns(values, tell):
+    columns = values["table", "columns"]
+    known = LEVEL_COLUMNS + VOLUME_COLUMNS
+    for name in dict.fromkeys(columns):
+        if name not in known:
+            text = message(
+                "export_column", "found {found}; expected one of {names}{hint}",
+                found=shown(name), names=list(known), hint=nearest(name, known),
+            )  # fmt: skip
+            tell("table", "columns", text)
+        elif columns.count(name) > 1:
+            text = message("export_column_twice", "{name} is given twice", name=name)
+            tell("table", "columns", text)
+    if columns and set(columns) <= set(known):
+        for needed in (LEVEL_COLUMNS, VOLUME_COLUMNS):
+            if not set(needed) & set(columns):
+                text = message("export_column_of", "has none of {names}; expected one of them",
+                               names=list(needed))  # fmt: skip
+                tell("table", "columns", text)
+    headings = values["file", "headings"]
+    if headings and len(headings) != len(columns):
+        text = message(
+            "export_headings", "{count} headings; expected {columns}, one for each column",
+            count=len(headings), columns=len(columns),
+        )  # fmt: skip
+        tell("file", "headings", text)
+    if "increments" in columns and values["levels", "increment"] is None:
+        text = message("export_no_increment", "missing; expected it for the column increments")
+        tell("levels", "increment", text)
+    for line in values["file", "header"]:
+        for name in _unknown_placeholders(line):
+            text = message(
+                "export_placeholder", "found {found} in braces; expected one of {names}",
+                found=shown(name), names=list(PLACEHOLDERS),
+            )  # fmt: skip
+            tell("file", "header", text)
+
+
+def _unknown_placeholders(line):
+    """What stands in braces and is none of the placeholders; of braces that are not in pairs {}."""
+    try:
+        parts = list(string.Formatter().parse(line))
+    except ValueError:
+        return [line]
+    return [
+        name for _, name, form, turned in parts
+        if name is not None and (name not in PLACEHOLDERS or form or turned)
+    ]  # fmt: skip
+
+
+def _check_table(values, tell):
+    step, grid = values["table", "step_m"], values["table", "grid"]
+    if grid == "step" and step is None:
+        text = message("export_no_step", "missing; expected it where grid is step")
+        tell("table", "step_m", text)
+    if grid != "step" and step is not None:
+        tell("table", "step_m", message("export_step", "given where grid is not step; remove it"))
+    wholes = (("table", "min_points"), ("table", "max_points"), ("levels", "decimals"),
+              ("volumes", "decimals"), ("volumes", "digits"))  # fmt: skip
+    for section, key in wholes:
+        value = values[section, key]
+        if value is not None and value != int(value):
+            text = message("export_whole", "found {value:g}; expected a whole number", value=value)
+            tell(section, key, text)
+    fewest, most = values["table", "min_points"], values["table", "max_points"]
+    if fewest is not None and most is not None and fewest > most:
+        text = message("export_points_cross", "{fewest:g}, above max_points {most:g}",
+                       fewest=fewest, most=most)  # fmt: skip
+        tell("table", "min_points", text)
+    digits, decimals = values["volumes", "digits"], values["volumes", "decimals"]
+    if digits is not None and decimals is not None and digits <= decimals:
+        text = message(
+            "export_digits_cross", "{digits:g} digits; expected more than the {decimals:g} "
+            "decimals", digits=digits, decimals=decimals,
+        )  # fmt: skip
+        tell("volumes", "digits", text)
+    if values["levels", "unit"] in MARKED and values["levels", "decimals"]:
+        text = message("export_marks", "given for feet and inches in parts; remove it")
+        tell("levels", "decimals", text)
+
+
+def _check_marks(values, tell):
+    separator = values["file", "separator"] or ","
+    decimal = values["file", "decimal"] or "."
+    thousands = values["file", "thousands"] or ""
+    if separator == decimal:
+        tell("file", "separator", message("export_mark_twice", "is the decimal mark, too; expected "
+             "another"))  # fmt: skip
+    if thousands and thousands in (separator, decimal):
+        text = message("export_thousands", "is the separator or the decimal mark, too; expected "
+                       "another")  # fmt: skip
+        tell("file", "thousands", text)
+    if separator == " " and values["levels", "unit"] in MARKED:
+        text = message("export_spaces", "stands within feet and inches, too; expected another")
+        tell("file", "separator", text)
+
+
+def _profile(file, values):
+    renamed = {
+        (section, key): f"{section.removesuffix('s')}_{key}"
+        for section in ("levels", "volumes")
+        for key in ("unit", "decimals")
+    }
+    whole = {"min_points", "max_points", "level_decimals", "volume_decimals", "digits"}
+    given = {}
+    for place, value in values.items():
+        name = renamed.get(place, place[1])
+        if value is not None:
+            given[name] = int(value) if name in whole else value
+    return Profile(code=file.removesuffix(_ENDING), **given)

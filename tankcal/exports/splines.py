@@ -1,0 +1,141 @@
+"""Rows that a natural cubic spline runs through, for systems that read a spline between points.
+
+No chord can be judged alone here, so the best rows are sought, not proved: from a few rows on the
+worst one is added each time, then single rows are moved while the error becomes less.
+"""
+
+import numpy as np
+
+from tankcal.exports.breakpoints import Breakpoints
+
+_PART_AT_ONCE = 4  # of the rows still to add, one in four where several pieces are bad
+_MOST_MOVED = 64  # points: more are not moved
+_MOST_TRIED = 1200  # splines
+_FALL = 1e-9  # of the mean slope
+
+
+def spline_breakpoints(height, volume, points, *, fixed=(), at=None, written=None, candidates=None):
+    """`Breakpoints` of at most so many points for a natural cubic spline; None: none is monotone.
+
+    Parameters
+    ----------
+    height, volume, points, fixed, at, written, candidates
+        As of `breakpoints.best_breakpoints`.
+
+    Returns
+    -------
+    Breakpoints or None
+        The error bounds the distance of the spline from the table at any height.
+    """
+    seeker = _Seeker(height, volume, at, written)
+    count = len(seeker.height)
+    is_open = np.ones(count, dtype=bool) if candidates is None else np.array(candidates, dtype=bool)
+    must = sorted({0, count - 1, *fixed})
+    is_open[must] = True
+    rows = seeker.filled(must, np.flatnonzero(is_open), points)
+    if len(rows) <= _MOST_MOVED:
+        rows = seeker.moved(rows, set(must), is_open)
+    error, where, is_rising = seeker.judge(rows)
+    return Breakpoints(np.array(rows), error, where) if is_rising else None
+
+
+def fewest_spline_breakpoints(height, volume, error, *, most, **given):
+    """The same of as few points as keep an error, at most so many; None: none were found."""
+    low, high, best = 2, most, None
+    while low <= high:
+        points = (low + high) // 2
+        found = spline_breakpoints(height, volume, points, **given)
+        if found is not None and found.error <= error:
+            best, high = found, min(points, len(found.rows)) - 1
+        else:
+            low = points + 1
+    return best
+
+
+def spline_error(height, volume, at, written, rows):
+    """(bound of the error of the spline through the written rows at any height, the worst)."""
+    error, where, _ = _Seeker(height, volume, at, written).judge(rows)
+    return error, where
+
+
+class _Seeker:
+    """A table, its rows as written, and splines through some of them."""
+
+    def __init__(self, height, volume, at, written):
+        self.height, self.volume = (np.asarray(one, dtype=float) for one in (height, volume))
+        self.at = self.height if at is None else np.asarray(at, dtype=float)
+        self.written = self.volume if written is None else np.asarray(written, dtype=float)
+
+    def _spline(self, rows):
+        from scipy.interpolate import CubicSpline
+
+        kind = "natural" if len(rows) > 2 else "not-a-knot"
+        return CubicSpline(self.at[rows], self.written[rows], bc_type=kind)
+
+    def judge(self, rows):
+        """(bound of the error at any height, height of the worst row, whether the spline rises).
+
+        Between two heights the spline is off its own chord by at most max |s''| d^2/8, and s'' is
+        straight there.
+        """
+        spline, ends = self._spline(rows), self.at[[rows[0], rows[-1]]]
+        heights = np.union1d(self.height, self.at[rows])
+        inside = np.clip(heights, *ends)
+        off = np.abs(spline(inside) - np.interp(heights, self.height, self.volume))
+        bend = np.abs(spline(inside, 2))
+        beside = np.maximum(off[1:], off[:-1]) + np.maximum(bend[1:], bend[:-1]) * (
+            np.diff(inside) ** 2 / 8
+        )
+        worst = int(np.argmax(off))
+        return max(float(beside.max()), float(off[worst])), float(heights[worst]), rises(spline)
+
+    def filled(self, rows, free, points):
+        """Rows with the worst ones added until there are so many."""
+        rows = list(rows)
+        while len(rows) < points:
+            off = np.abs(self._spline(rows)(self.at[free]) - self.volume[free])
+            off[np.isin(free, rows)] = -1.0
+            piece = np.searchsorted(rows, free)
+            order = np.argsort(-off)
+            _, first = np.unique(piece[order], return_index=True)
+            worst = order[np.sort(first)][: max(1, (points - len(rows)) // _PART_AT_ONCE)]
+            new = [int(free[k]) for k in worst if off[k] >= 0]
+            if not new:
+                break
+            rows = sorted({*rows, *new})
+        return rows
+
+    def moved(self, rows, must, is_open):
+        """Rows moved one by one, by ever smaller steps, while the error becomes less."""
+        rows, best, left = list(rows), self._rank(rows), _MOST_TRIED
+        step = max(len(self.height) // (2 * len(rows)), 1)
+        while step and left > 0:
+            before = best
+            for n in range(1, len(rows) - 1):
+                for row in (rows[n] + step, rows[n] - step):
+                    is_free = rows[n] not in must and rows[n - 1] < row < rows[n + 1]
+                    if not is_free or not is_open[row]:
+                        continue
+                    tried, left = [*rows[:n], row, *rows[n + 1 :]], left - 1
+                    rank = self._rank(tried)
+                    if rank < best:
+                        rows, best = tried, rank
+            if best == before:
+                step //= 2
+        return rows
+
+    def _rank(self, rows):
+        """What is to become less: a spline that falls comes after all others, then the error."""
+        error, _, is_rising = self.judge(rows)
+        return (not is_rising, error)
+
+
+def rises(spline):
+    """Whether a cubic spline falls nowhere: its slope is judged at knots and where it is least."""
+    slope = spline.derivative()
+    knots = spline.x
+    bend = spline.derivative(2)
+    turns = bend.roots(extrapolate=False)
+    places = np.concatenate([knots, turns[np.isfinite(turns)]])
+    mean = (spline(knots[-1]) - spline(knots[0])) / (knots[-1] - knots[0])
+    return bool(np.all(slope(places) >= -_FALL * abs(mean)))
