@@ -496,6 +496,14 @@ def test_lines_by_total_station(tmp_path):
     assert np.abs(scaled).max() < 1e-6
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("longer_mm", [0.3, 0.7, 1.2, 1.4, 3.0])
+def test_what_nothing_controls_is_not_set_aside(tmp_path, longer_mm):
+    """Property: where a line alone tells its own place, rounding rejects none of its readings."""
+    result = run(tmp_path, line_parts(longer_m=1e-3 * longer_mm))
+    assert len(result.accepted) == 18
+
+
 def test_lines_tell_no_radius_without_a_strap(tmp_path):
     parts = line_parts()
     del parts.tables["circumferences"]

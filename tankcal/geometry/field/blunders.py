@@ -32,6 +32,7 @@ MOST_ROUNDS = 4  # of amplitudes from the accepted readings, and tests of all wi
 FEW = 0.005  # of the readings: when no more of them change sides, the amplitudes stay
 AT_ONCE = 0.9
 PIECE = 200  # readings that are tested together, about, where all are more than a field takes
+MOST_SD = 30  # of its own before: a reading that the others predict no better is not controlled
 NOTHING_LEFT = 1e-9  # of the largest eigenvalue of P_SS: what is smaller is zero but for rounding
 
 
@@ -98,9 +99,10 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted, barred=None
         variances, noise = sizes[:-1], sizes[-1]
         for piece in pieces:
             own = piece.members
-            precision = piece.precision(variances, noise * variance_m2[own] + LEAST_NOISE_M**2)
-            pull = precision @ left[own]
-            tested = snoop_wall(precision, pull, accepted[own], barred=barred[own])
+            own_noise = noise * variance_m2[own] + LEAST_NOISE_M**2
+            precision, before_m = piece.precision(variances, own_noise)
+            pull, most = precision @ left[own], MOST_SD * before_m
+            tested = snoop_wall(precision, pull, accepted[own], True, most, barred[own])
             for name in ("accepted", "departure_m", "w", "sd_m"):
                 getattr(found, name)[own] = getattr(tested, name)
         changed, accepted = np.mean(found.accepted != accepted), found.accepted.copy()
@@ -138,10 +140,11 @@ class Piece:
         self._design = free_design(chosen)[0]
 
     def precision(self, variances_m2, noise_m2):
-        """`Precision` with variances (n,) of the noise."""
+        """`Precision` with variances (n,) of the noise, and (n,) sds of the readings before, m."""
         whole = self._covariances.total(variances_m2)
         whole.flat[:: len(whole) + 1] += noise_m2
-        return Precision(whole, self._design)
+        before = np.sqrt(np.diag(whole))
+        return Precision(whole, self._design), before
 
 
 def restricted_precision(covariance, design):

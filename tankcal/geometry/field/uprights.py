@@ -60,7 +60,7 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure, scatter
 
     def without(sizes):
         noise = sizes[-1] * variance_m2 + LEAST_NOISE_M**2
-        precision = piece.precision(sizes[:-1], noise)[:, :]  # most of its columns are asked for
+        precision = piece.precision(sizes[:-1], noise)[0][:, :]  # most of its columns are asked for
         return _eliminated(precision, precision @ left, np.flatnonzero(~tested.accepted))
 
     sizes, least = tested.sizes_m2, max(LEAST_M, LEAST_W * scatter_m)
