@@ -19,8 +19,8 @@ from tankcal.tank.heads import Cut, End, Line, depth_of
 from tankcal.tank.lying import (
     LyingSolid,
     Piece,
-    check_directions,
     check_dip,
+    check_directions,
     pieces_of_ends,
     refuse_meeting_ends,
     require_length,

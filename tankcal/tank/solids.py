@@ -13,8 +13,8 @@ from tankcal.tank.heads import Cut, End, Line
 from tankcal.tank.lying import (
     LyingSolid,
     Piece,
-    check_directions,
     check_dip,
+    check_directions,
     levels_inside,
     pieces_of_ends,
     refuse_meeting_ends,

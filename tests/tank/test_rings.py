@@ -130,9 +130,7 @@ def test_derivatives_by_each_ring(name, field, place):
     assert_derivative(volumes, getattr(tank, field), tank.derivatives(dips)[name], tolerance=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("name", "field"), [("tilt", "tilt"), ("dip_position", "dip_from_a_m")]
-)
+@pytest.mark.parametrize(("name", "field"), [("tilt", "tilt"), ("dip_position", "dip_from_a_m")])
 def test_derivatives_by_place(name, field):
     """Truth: differences of volumes."""
     dips = np.array([0.03, 0.4, 1.3, 2.2])

@@ -120,14 +120,21 @@ RADII = ("dish_radius_m", "knuckle_radius_m")
 ROUND_ONLY = ("torispherical", "spherical")
 
 
-def check_horizontal(values, has_points, raw, log):
-    """Sizes, ends, tilt and dip point of a horizontal cylinder."""
+def check_horizontal(values, wall, raw, log):
+    """Sizes, ends, tilt and dip point of a horizontal cylinder.
+
+    wall  what it comes from: "points", "straps", or None: the sizes
+    """
+    has_points = wall == "points"
 
     def tell_problem(key, expected):
         tell(log.problem, raw, "horizontal", key, expected)
 
     given = values["horizontal"]
-    _check_thickness(given, values["survey"]["side"], "horizontal", raw, log)
+    if wall == "straps":
+        _check_ringed(given, raw, log)
+    else:
+        _check_thickness(given, values["survey"]["side"], "horizontal", raw, log)
     if has_points:
         _refuse_given(given, (*SIZES, "tilt_mm_per_m"), raw, log)
         for key, expected in (
@@ -150,7 +157,8 @@ def check_horizontal(values, has_points, raw, log):
             if is_not_given(raw, "horizontal", key):
                 tell_problem(key, expected)
     else:
-        _check_sizes(given, raw, log)
+        if wall is None:
+            _check_sizes(given, raw, log)
         if given["azimuth_deg"] is not None:
             tell_problem(
                 "azimuth_deg",
@@ -160,8 +168,28 @@ def check_horizontal(values, has_points, raw, log):
                 ),
             )
     for end in ("end_a", "end_b"):
-        _check_end(given, end, has_points, raw, log)
+        _check_end(given, end, wall is not None, raw, log)
     _check_dip(given, raw, log)
+
+
+def _check_ringed(given, raw, log):
+    """Rings have sizes and plates of their own; thickness_mm is of the ends alone."""
+    for key in (*SIZES, "roll_deg"):
+        if given[key]:
+            expected = message(
+                "size_beside_rings",
+                "given together with circumferences by tape; expected only one of them: the rings"
+                " are round, and have their sizes from these",
+            )
+            tell(log.problem, raw, "horizontal", key, expected)
+    curved = any(given[end] not in (None, "flat") for end in ("end_a", "end_b"))
+    if curved and is_not_given(raw, "horizontal", "thickness_mm"):
+        expected = message(
+            "end_thickness_missing",
+            "missing; expected plate and paint of the ends, which are subtracted from their depths"
+            " or radii (0: these are inside)",
+        )
+        tell(log.problem, raw, "horizontal", "thickness_mm", expected)
 
 
 def _refuse_given(given, keys, raw, log, section="horizontal"):
