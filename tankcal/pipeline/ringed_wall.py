@@ -33,6 +33,11 @@ KIND_OF_WAVES = {"oval": "ovality", "seam": "seams"}
 class RingedWall(TapedWall):
     """The rings of a lying tank as strapped; their levels are places along the axis from A."""
 
+    def radius_sd_m(self, factors):
+        """(rings,) standard deviation of the mean radii by `RingFeatures.factors`."""
+        rings = len(self.joints_m) - 1
+        return np.sqrt(sum(np.sum(one.columns[:rings] ** 2, axis=1) for one in factors))
+
     def features_at(self, dip_from_a_m):
         """`RingFeatures` of a tank that is dipped there."""
         return RingFeatures(self, dip_from_a_m)

@@ -100,6 +100,16 @@ class RingedTank(LyingSolid):
         return float(self.joints_m[-1])
 
     @property
+    def width_m(self):
+        """Mean inside diameter along the cylinder."""
+        return 2 * float(np.average(self.radii_m, weights=self.lengths_m))
+
+    @property
+    def height_m(self):
+        """The same: each ring is round."""
+        return self.width_m
+
+    @property
     def top_m(self):
         """The highest dip: where its line meets the top."""
         return (self._radius_m + self._radius_at_top_m) * self._stretch
