@@ -251,9 +251,9 @@ def _ring_choices(result):
         return {}
     shape_mm = 1000 * result.rings.shape_sd_m
     return {
-        "survey": "strapping",
+        "survey": "strapping_rings",
         "area_term": shape_mm or "none",
-        "between_sections": "cylinders",
+        "between_sections": "rings",
         "form": "learned",
     }
 

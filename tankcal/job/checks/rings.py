@@ -64,7 +64,7 @@ def _are_both_there(tables, raw, log):
 
 def _refuse_beside(tables, log):
     for is_there, what in (
-        (has_wall_points(tables), message("points_of_wall", "points of the wall")),
+        (has_wall_points(tables), message("points_beside_rings", "points of the wall")),
         (is_metered(tables), message("metered_runs", "runs of metered liquid")),
     ):
         if is_there:

@@ -3,6 +3,7 @@
 from itertools import pairwise
 
 from tankcal.job.checking import refuse_repeated
+from tankcal.job.contract.courses import SMALLEST_THICKNESS_MM, thin_plate
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.fields import Field
 from tankcal.messages import message
@@ -29,7 +30,6 @@ COLUMNS = {"rings": RINGS}
 
 MOST_RINGS = 100
 MISS_M, MISS_RELATIVE = 0.020, 0.002  # of the sum of the rings from the length of the cylinder
-THINNEST_MM = 1.0
 
 
 def check_rings_alone(rings, gauged, values, log):
@@ -57,13 +57,8 @@ def check_rings_alone(rings, gauged, values, log):
                 " gauge says it",
             )
             log.problem(rings.file, expected, row, "thickness_mm")
-        elif thickness is not None and 0 < thickness < THINNEST_MM:
-            expected = message(
-                "thin_plate",
-                "found {thickness:g}; expected millimetres, 0 or at least 1: is it in metres?",
-                thickness=thickness,
-            )
-            log.problem(rings.file, expected, row, "thickness_mm")
+        elif thickness is not None and 0 < thickness < SMALLEST_THICKNESS_MM:
+            log.problem(rings.file, thin_plate(thickness), row, "thickness_mm")
     if values is not None:
         _check_sum(rings, values["horizontal"]["length_m"], log)
     laps = rings.of("lap")
