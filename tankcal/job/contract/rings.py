@@ -18,7 +18,7 @@ RINGS = (
         0,
         100,
     ),
-    number("paint_mm", "paint thickness, millimetres; blank: 0", 0, 10),
+    number("paint_mm", "thickness of the paint, millimetres; blank: 0", 0, 10),
     choice(
         "lap",
         "of lap-jointed rings: inner or outer, for all of them; only compared; blank: not known",
