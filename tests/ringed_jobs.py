@@ -1,7 +1,7 @@
 """Jobs of lying tanks whose rings were strapped, with readings of known radii.
 
-    parts = ringed_parts()                       the three rings of the specification
-    parts = ringed_parts(radii_m=(1.2, 1.2))     inside; lap, plates and readings to suit
+parts = ringed_parts()                       the three rings of the specification
+parts = ringed_parts(radii_m=(1.2, 1.2))     inside; lap, plates and readings to suit
 """
 
 import numpy as np

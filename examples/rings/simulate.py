@@ -46,7 +46,7 @@ def area_below(radius, level):
 def volume(dip):
     """Below a plumb dip; ends are ellipsoids on the section that they touch."""
     radius, up = section(DIP_FROM_A)
-    zero = up - np.interp(0.0, TURN - 2 * np.pi * (TURN > np.pi), radius, period=2 * np.pi)
+    zero = up - np.interp(0.0, TURN - 2 * np.pi * (np.pi < TURN), radius, period=2 * np.pi)
     cos, whole = 1 / np.hypot(1, TILT), 0.0
     nodes, weights = np.polynomial.legendre.leggauss(24)
     for ring in range(RINGS):

@@ -1,7 +1,7 @@
 """Field sheets of a starter job: its tables of readings as a crew fills them in by pen."""
 
-from tankcal.job.contract import SURVEYS, columns_of
-from tankcal.job.starter.form import DECLARED, METERED, OF_SHELLS
+from tankcal.job.contract import columns_of
+from tankcal.job.starter.form import DECLARED, METERED, OF_SHELLS, Form
 from tankcal.job.starter.texts import parted, texts_in
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
@@ -9,6 +9,7 @@ from tankcal.report.plain import PlainPaper
 FILE = "field-sheets.pdf"
 BY_PEN = (*(one for one in OF_SHELLS if one != DECLARED), METERED)  # that a crew writes down
 FORMS = (  # tables of each, read in one go, and the rows that a sheet has room for
+    (("rings",), 12),
     (("lines",), 12),
     (("offsets",), 30),
     (("setups",), 9),
@@ -84,7 +85,8 @@ def sheets(survey, language, kind="vertical"):
     if survey == METERED:
         found.append(blocks.paragraph(paper.word("forms.batches")))
         found += [*_meters(paper, texts), *_valves(paper)]
-    forms = [(names, rows) for names, rows in FORMS if set(names) <= set(SURVEYS[survey])]
+    tables = set(Form(kind, survey, language).tables)
+    forms = [(names, rows) for names, rows in FORMS if set(names) <= tables]
     if any(_is_angle(field) for names, _ in forms for field in _columns(names, kind)):
         found.append(blocks.paragraph(paper.word("forms.angles")))
     for names, rows in forms:

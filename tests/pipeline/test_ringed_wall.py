@@ -107,7 +107,8 @@ def test_ovality_moves_the_middle_and_hardly_the_top(tmp_path):
     levels = np.array([1.2, result.body.highest_m])
     oval = next(one for one in result.body.sources(levels) if one.kind == "ovality")
     middle, top = np.sqrt(np.sum(oval.columns_m3**2, axis=1))
-    assert middle > 0.02 and top < 1e-6
+    assert middle > 0.02
+    assert top < 1e-6
 
 
 def test_a_tape_on_a_warm_shell_nearly_cancels(tmp_path):
@@ -176,7 +177,8 @@ def test_exchanges_are_found_and_sound_orders_left_alone(seed):
         found += bool(pairs)
         named += tuple(sorted((int(one), int(other)))) in pairs
     assert wrong == 0
-    assert found >= 75 and named == found
+    assert found >= 75
+    assert named == found
 
 
 def test_two_pairs_are_named_where_both_fit():

@@ -1,5 +1,6 @@
 """Lying cylinders of rings: published figures, today's cylinder, another program, quadrature."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -109,7 +110,7 @@ def _by_quadrature(tank, dip):
             for side in (-1, 1)
         ]
         inner = sorted({start, stop, *(s for s in meets if start < s < stop)})
-        for low, high in zip(inner, inner[1:], strict=False):
+        for low, high in itertools.pairwise(inner):
             whole += scipy.integrate.quad(
                 segment, low, high, args=(radius,), epsabs=1e-12, epsrel=1e-12, limit=200
             )[0]
