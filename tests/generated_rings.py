@@ -3,9 +3,10 @@
     tank = make_tank(rng)
     job = strapped_job(rng, tank, job)
 
-Rings taper and bulge, flatten by their own weight, are oval each in its own way, may have a dent,
-and stand off the common axis; joints are lapped or flush. The truth of a volume is the sum of
-polygons of the true sections. The tape lies on the hull of the outside of the painted ring.
+Rings taper and bulge, are drawn in at their welds, flatten by their own weight, are oval each in
+its own way, may have a dent, and stand off the common axis; joints are lapped or flush. The truth
+of a volume is the sum of polygons of the true sections. The tape lies on the hull of the outside
+of the ring.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +16,7 @@ from scipy.spatial import ConvexHull
 
 from tankcal.survey.strapping import Strap, Tape
 
-COUNT, NODES = 1080, 8  # azimuths of a section, Gauss places of a ring
+COUNT, NODES = 720, 20  # azimuths of a section, Gauss places of a ring
 TURN = (np.arange(COUNT) + 0.5) * 2 * np.pi / COUNT  # from the bottom
 STEP = 2 * np.pi / COUNT
 ALPHA, TAPE_ALPHA, TAPE_M, PLATE_M = 1.1e-5, 1.15e-5, 0.2e-3, 0.008
@@ -35,22 +36,25 @@ class Rings:
 
     Attributes
     ----------
-    base, taper, bulge, axis, length : ndarray, shape (rings,)
+    base, taper, bulge, drawn, axis, length : ndarray, shape (rings,)
+        Of drawn: by how much the weld of a joint draws the plate in, over reach.
     waves : ndarray, shape (rings, orders, 2)
         Of cos and sin of orders from 2 on.
     dents : tuple of (ring, azimuth, zeta, depth, width)
-    tilt, dip : float
+    tilt, dip, reach : float
     """
 
     base: np.ndarray
     taper: np.ndarray
     bulge: np.ndarray
+    drawn: np.ndarray
     axis: np.ndarray
     length: np.ndarray
     waves: np.ndarray
     dents: tuple
     tilt: float
     dip: float
+    reach: float
 
     @property
     def joints(self):
@@ -59,6 +63,8 @@ class Rings:
     def section(self, ring, zeta, turn=TURN):
         """(n,) inside radii."""
         found = self.base[ring] + self.taper[ring] * zeta + self.bulge[ring] * (1.5 * zeta**2 - 0.5)
+        from_joint = (1 - abs(zeta)) * self.length[ring] / 2
+        found = found - self.drawn[ring] * np.exp(-from_joint / self.reach)
         orders = np.arange(2, 2 + self.waves.shape[1])
         found = found + np.cos(np.outer(turn, orders)) @ self.waves[ring, :, 0]
         found = found + np.sin(np.outer(turn, orders)) @ self.waves[ring, :, 1]
@@ -122,23 +128,26 @@ def make_tank(rng):
          rng.uniform(0, 0.005), rng.uniform(0.1, 0.3))
         for _ in range(rng.integers(3))
     )  # fmt: skip
+    wide, drawn = np.exp(rng.uniform(*np.log([0.1, 1.5]), size=2)) * 1e-3
     lean = np.exp(rng.uniform(*np.log([0.2, 1.0]))) * 1e-3
     return Rings(
         base=radius + laps + rng.normal(0, 8e-4, count),
         taper=rng.normal(0, lean, count),
-        bulge=-abs(rng.normal()) * 3e-4 + rng.normal(0, 3e-4, count),
+        bulge=-wide * rng.uniform(-0.5, 1.0) + 0.3 * wide * rng.normal(size=count),
+        drawn=drawn * rng.uniform(0.5, 1.5, count),
         axis=rng.normal(0, U["ring_axes"], count),
         length=length + rng.normal(0, U["ring_lengths"], count),
         waves=waves,
         dents=dents,
         tilt=rng.uniform(-0.01, 0.01),
         dip=float(rng.uniform(0.15, 0.85) * length.sum()),
+        reach=rng.uniform(0.05, 0.2),
     )
 
 
-def strapped_job(rng, tank, job):
-    """The job with the readings of the tank, at 20 and 80 % of each ring, and what a crew has of
-    its sizes.
+def strapped_job(rng, tank, job, shares=(0.2, 0.8)):
+    """The job with the readings of the tank, at shares of each ring, and what a crew has of its
+    sizes.
     """
     shell_c, warmer = 29.0, rng.uniform(-2, 2)
     larger = 1 + ALPHA * (shell_c + warmer - 20)
@@ -147,7 +156,7 @@ def strapped_job(rng, tank, job):
     known_m = tank.length + rng.normal(0, U["ring_lengths"], len(tank.length))
     straps = []
     for ring, start in enumerate(tank.joints[:-1]):
-        for share in (0.2, 0.8):
+        for share in shares:
             girth = tank.girth(start + share * tank.length[ring], plate, larger) + np.pi * TAPE_M
             reading = girth / (1 + TAPE_ALPHA * (shell_c + warmer - 20)) / scale
             place = float(np.sum(known_m[:ring]) + share * known_m[ring])
