@@ -4,8 +4,8 @@ A ring is a cylinder of the mean radius of its straps. What it does between them
 how far its bottom at the dip is from that mean, is in the doubt, as large as the components of
 walls (`geometry.field`) say. A tape tells nothing of how a ring departs from a circle, so its size
 is declared, and each wave cos(k a) of it moves the rows of the table: by itself, and by the bottom
-that dips count from. A lying tank flattens by its own weight: the part of waves that components
-have in common is common to all rings.
+that dips count from. A lying tank flattens by its own weight: half of the variance is taken as
+that, wave 2 of all rings alike; the other half is spread as the components of walls are.
 """
 
 from dataclasses import dataclass
@@ -26,6 +26,7 @@ from tankcal.tank.factors import Factor
 from tankcal.tank.rings import WAVES
 from tankcal.uncertainty import factor_of
 
+FLATTENED = 0.5  # of the variance round a ring: by its own weight, on saddles
 KIND_OF_WAVES = {"oval": "ovality", "seam": "seams"}
 
 
@@ -112,7 +113,11 @@ class RingFeatures:
     def _of_waves(self):
         """`Factor`s of the departures from a circle, of the declared size."""
         shape = self._wall.shape_sd_m
-        shares = {one: size * shape**2 for one, size in _shares_of_waves().items()}
+        if not shape:
+            return
+        shares = {
+            one: (1 - FLATTENED) * size * shape**2 for one, size in _shares_of_waves().items()
+        }
         radius = float(np.mean(self._wall.radius_m))
         orders = np.arange(2.0, OVALITY_MODES[-1] + 1)
         for name, kind in KIND_OF_WAVES.items():
@@ -121,8 +126,9 @@ class RingFeatures:
                 *self._waves(np.sqrt(shares[name, True] * spectrum), common=True),
                 *self._waves(np.sqrt(shares[name, False] * spectrum), common=False),
             ]
-            if shape:
-                yield Factor(kind, np.column_stack(columns), type="B", note="assumed")
+            if name == "oval":  # a sd of cos 2a that is that of the radius, times the root of 2
+                columns += self._waves(np.sqrt([2 * FLATTENED * shape**2]), common=True)
+            yield Factor(kind, np.column_stack(columns), type="B", note="assumed")
 
     def _waves(self, sds_m, *, common):
         """Columns of waves of these sizes, of all rings together or of each its own; the shorter
@@ -135,9 +141,10 @@ class RingFeatures:
                 column = np.zeros(count)
                 column[those] = sd
                 yield column
-        column = np.zeros(count)
-        column[self._rings] = np.sqrt(np.sum(sds_m[len(WAVES) :] ** 2))
-        yield column
+        if len(sds_m) > len(WAVES):
+            column = np.zeros(count)
+            column[self._rings] = np.sqrt(np.sum(sds_m[len(WAVES) :] ** 2))
+            yield column
 
 
 def _shares_of_waves():

@@ -442,13 +442,14 @@ def _of_lying(result):
         dip_direction=(tank.dip_direction, None),
         **_of_scan(result),
         full_capacity=(result.body.parts[0].capacity_m3, "m3"),
-        **(_unread(tank) if result.job.rings else {}),
+        **(_unread(tank, result.zero_m) if result.job.rings else {}),
     )
 
 
-def _unread(tank):
+def _unread(tank, zero_m):
     """What no dip reads: room below dip 0, and above the highest dip."""
-    return {"below_zero": (tank.below_zero_m3, "m3"), "left_at_full": (tank.left_m3, "m3")}
+    below = float(tank.volume_m3([zero_m])[0])
+    return {"below_zero": (below, "m3"), "left_at_full": (tank.left_m3, "m3")}
 
 
 def _of_scan(result):

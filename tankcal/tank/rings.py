@@ -124,11 +124,6 @@ class RingedTank(LyingSolid):
         """Room that is left when the liquid reaches the highest dip."""
         return self.capacity_m3 - float(self.volume_m3([self.top_m])[0])
 
-    @property
-    def below_zero_m3(self):
-        """What the tank holds below dip 0."""
-        return float(self.volume_m3([0.0])[0])
-
     def derivatives(self, levels_m):
         """{input: (rows,) or (rows, k)} derivative of the volume at a fixed dip, all else fixed.
 
