@@ -140,6 +140,11 @@ SLIPS = {
         "size_beside_rings",
         ("job.toml", "horizontal.diameter_m"),
     ),
+    "a dip that leaves the top": (
+        lambda p: p.settings.update({"horizontal.dip_from_a_m": 8.99}),
+        "dip_leaves_top",
+        ("job.toml", "horizontal.dip_from_a_m"),
+    ),
     "surveyed inside": (
         lambda p: p.settings.update({"survey.side": "inside"}),
         "strapped_inside",

@@ -13,6 +13,7 @@ from tankcal.job.checks.extent import (
     has_radii,
     has_survey,
     has_wall_points,
+    height_of_rings,
     is_metered,
     is_sighted,
     is_strapped,
@@ -113,7 +114,7 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
     elif has_rows(points):
         check_scan(points, values, kind, raw, log)
     if kind == "horizontal":
-        check_horizontal(values, wall_of(tables), raw, log)
+        check_horizontal(values, wall_of(tables), raw, log, height_of_rings(tables))
     if kind == "sphere":
         check_sphere(values, has_wall_points(tables), raw, log)
     if tables["deadwood"] is not None:

@@ -87,6 +87,17 @@ def wall_of(tables):
     return "straps" if is_strapped(tables) or has_rows(tables.get("rings")) else None
 
 
+def height_of_rings(tables):
+    """About the inside diameter of strapped rings, m; None: nothing tells it."""
+    if not is_strapped(tables) or not has_rows(tables.get("rings")):
+        return None
+    readings = [one for one in tables["circumferences"].of("reading_m") if one is not None]
+    plates = [one for one in tables["rings"].of("thickness_mm") if one is not None]
+    if not readings:
+        return None
+    return float(np.median(readings) / np.pi - 2e-3 * (np.median(plates) if plates else 0.0))
+
+
 @dataclass(frozen=True)
 class Extent:
     """What is known of a tank's size before anything is computed; None: not known.

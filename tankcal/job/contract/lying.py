@@ -120,10 +120,11 @@ RADII = ("dish_radius_m", "knuckle_radius_m")
 ROUND_ONLY = ("torispherical", "spherical")
 
 
-def check_horizontal(values, wall, raw, log):
+def check_horizontal(values, wall, raw, log, height_m=None):
     """Sizes, ends, tilt and dip point of a horizontal cylinder.
 
-    wall  what it comes from: "points", "straps", or None: the sizes
+    wall      what it comes from: "points", "straps", or None: the sizes
+    height_m  of the cylinder where a tape tells it, about
     """
     has_points = wall == "points"
 
@@ -169,7 +170,7 @@ def check_horizontal(values, wall, raw, log):
             )
     for end in ("end_a", "end_b"):
         _check_end(given, end, wall is not None, raw, log)
-    _check_dip(given, raw, log)
+    _check_dip(given, height_m, raw, log)
 
 
 def _check_ringed(given, raw, log):
@@ -333,9 +334,9 @@ def _check_radii(given, end, form, diameter, raw, log):
         tell(log.problem, raw, "horizontal", f"{end}_knuckle_radius_m", expected)
 
 
-def _check_dip(given, raw, log):
+def _check_dip(given, height_m, raw, log):
     dip, length, tilt = (given[key] for key in ("dip_from_a_m", "length_m", "tilt_mm_per_m"))
-    height = given["height_m"] or given["diameter_m"]
+    height = given["height_m"] or given["diameter_m"] or height_m
     if None not in (dip, length):
         is_plumb = given["dip_direction"] != "square" and None not in (tilt, height)
         at_top = dip + (tilt / 1000 * height if is_plumb else 0.0)
