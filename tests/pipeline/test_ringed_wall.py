@@ -1,9 +1,11 @@
 """From strapped rings of a lying tank to its table: worked numbers, second methods, warnings."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import ROOT
 from job_builder import job_parts, write_folder
 from ringed_jobs import reading_of, ringed_parts
 
@@ -210,3 +212,14 @@ def test_nominal_diameter_is_compared(tmp_path):
     parts = ringed_parts(tank__nominal_diameter_m=2.5)
     assert "rings_unlike_nominal" in codes(result_of(parts, tmp_path))
     assert reading_of(1.2) == pytest.approx(7.5908, abs=1e-3)
+
+
+def test_example_holds_its_truth():
+    """Truth: polygons of the sections of a simulated tank (examples/rings/truth.json)."""
+    truth = json.loads((ROOT / "examples" / "rings" / "truth.json").read_text(encoding="utf-8"))
+    result = tankcal.run(tankcal.load(ROOT / "examples" / "rings"), simulated=False)
+    for dip, volume in zip(truth["dips_m"], truth["volumes_m3"], strict=True):
+        found = result.at(dip)
+        assert abs(found.value_m3 - volume) < found.U_m3
+    assert result.body.parts[0].capacity_m3 == pytest.approx(truth["capacity_m3"], abs=0.1)
+    assert codes(result) == set()
