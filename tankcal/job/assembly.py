@@ -24,6 +24,7 @@ from tankcal.job.model import (
     Material,
     Mesh,
     Points,
+    Ring,
     Roof,
     Sphere,
     StatedVolume,
@@ -173,6 +174,7 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         deadwood=_deadwood(tables["deadwood"]),
         roof=_roof(values["roof"]),
         horizontal=_horizontal(values["horizontal"], has_points) if kind == "horizontal" else None,
+        rings=_rings(tables) if kind == "horizontal" else (),
         sphere=_sphere(values["sphere"]) if kind == "sphere" else None,
         circumference_m=values["checks"]["circumference_m"],
         diameter_is=values["checks"]["diameter_is"],
@@ -267,6 +269,23 @@ def _courses(tables):
             tuple(sorted(azimuths[name])) if name in azimuths else None,
         )
         for name, height_m, thickness_mm, paint_mm in zip(*columns, strict=True)
+    )
+
+
+def _rings(tables):
+    table = tables["rings"]
+    if table is None:
+        return ()
+    read = gauged(tables["thickness"])
+    columns = map(table.of, ("ring", "length_m", "thickness_mm", "paint_mm", "lap"))
+    return tuple(
+        Ring(
+            name,
+            length_m,
+            *_plate((thickness_mm or 0.0) / 1000, (paint_mm or 0.0) / 1000, read.get(name)),
+            lap,
+        )
+        for name, length_m, thickness_mm, paint_mm, lap in zip(*columns, strict=True)
     )
 
 

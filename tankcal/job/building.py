@@ -10,6 +10,8 @@ from tankcal.job.checks.extent import has_radii, has_survey, is_metered, is_sigh
 from tankcal.job.clouds import make_clouds
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.contract.clouds import KINDS as OF_CLOUDS
+from tankcal.job.contract.strapping import COLUMNS as OF_TAPES
+from tankcal.job.contract.strapping import IN_PLACE
 from tankcal.job.covariance import OF_RADII, read_covariance
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
 from tankcal.job.hits import make_hits
@@ -27,6 +29,7 @@ from tankcal.job.tables import (
     RADII_COVARIANCE_FILE,
     RADII_TABLES,
     REGISTERS,
+    RING_TABLES,
     STRAPPING_TABLES,
     SURVEY_TABLES,
     TABLES,
@@ -85,6 +88,8 @@ def _read_tables(raw, registers, is_whole, log):
         allowed += SURVEY_TABLES
     if kind == "vertical":
         allowed += STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + RADII_TABLES
+    if kind == "horizontal":
+        allowed += (*RING_TABLES, *OF_TAPES)
     if kind in OF_CLOUDS:
         allowed += CLOUD_TABLES
     tables = {"clouds": _cloud_table(raw, registers, kind, log)}
@@ -99,10 +104,17 @@ def _read_tables(raw, registers, is_whole, log):
         if table is None or (is_empty and name not in TANK_TABLES):
             tables[name] = None
         else:
-            tables[name] = read_columns(name, table, log)
+            tables[name] = _as_upright(read_columns(name, table, log, kind=kind))
     if is_whole:
         _tell_missing_tables(raw, tables, kind, log)
     return tables
+
+
+def _as_upright(table):
+    """A table of a lying tank with the columns that an upright one has in their place."""
+    own = {name: table.columns[in_place] for name, in_place in IN_PLACE.items()
+           if in_place in table.columns and name not in table.columns}  # fmt: skip
+    return replace(table, columns=table.columns | own) if own else table
 
 
 def _cloud_table(raw, registers, kind, log):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.job.contract import COLUMNS, KEYS, KINDS, OPEN_SECTIONS, REGISTER_KEYS
+from tankcal.job.contract import KEYS, KINDS, OPEN_SECTIONS, REGISTER_KEYS, columns_of
 from tankcal.job.contract.registers import FAMILIES, SHORT_KEYS
 from tankcal.job.fields import IN_TOML, MAX_NAME, NEXT_TO_ZERO, Field, Refused, is_blank, read_value
 from tankcal.job.tables import nearest, shown
@@ -286,12 +286,12 @@ def _row_of(value, row):
     return row if value is None or value.row is None else value.row
 
 
-def read_columns(name, table, log, fields=None):
+def read_columns(name, table, log, fields=None, kind=None):
     """ColumnValues of one raw table; unknown, missing and bad things are told to `log`.
 
-    fields  its columns; None: those that a job's table of this name has
+    fields  its columns; None: those that the table of this name has in a job of a tank of the kind
     """
-    fields = COLUMNS[name] if fields is None else fields
+    fields = columns_of(name, kind) if fields is None else fields
     known = [field.name for field in fields]
     for heading in table.headings:
         if heading not in known:

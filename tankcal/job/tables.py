@@ -32,8 +32,9 @@ TANGENT_TABLES = ("tangents",)
 CLOUD_TABLES = ("scan_targets",)
 LIQUID_TABLES = ("liquid",)
 RADII_TABLES = ("radii",)
+RING_TABLES = ("rings",)
 TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + CLOUD_TABLES
-TABLES += LIQUID_TABLES + RADII_TABLES + SURVEY_TABLES
+TABLES += LIQUID_TABLES + RADII_TABLES + RING_TABLES + SURVEY_TABLES
 REGISTERS = {  # what each lists
     "cameras": "camera",
     "instruments": "instrument",

@@ -26,6 +26,7 @@ from tankcal.pipeline.liquid_result import LiquidResult
 from tankcal.pipeline.nominal_wall import NominalWall
 from tankcal.pipeline.radii_wall import RadiiWall
 from tankcal.pipeline.read_wall import ReadWall
+from tankcal.pipeline.ringed_wall import RingedWall
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
@@ -96,6 +97,8 @@ class Result:
         The wall of the drawing, of an upright tank that only liquid tells.
     radii : radii_wall.RadiiWall or None
         The wall of declared radii, with what was measured again in them.
+    rings : ringed_wall.RingedWall or None
+        The rings of a lying cylinder that a tape was put round.
     body : body.Body
         The tank as the sum of its parts, with all corrections that are on.
     zero_m : float
@@ -154,6 +157,7 @@ class Result:
     liquid: LiquidResult | None = None
     nominal: NominalWall | None = None
     radii: RadiiWall | None = None
+    rings: RingedWall | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -220,7 +224,7 @@ class Result:
     @property
     def straps(self) -> Straps | None:
         """Circumferences by tape, and what the wall says of them; None where none were read."""
-        wall = self.wall or self.strapped
+        wall = self.wall or self.strapped or self.rings
         return None if wall is None else wall.straps
 
     @property
@@ -410,6 +414,7 @@ def _run(job, progress, part_progress, simulated, reading):
         liquid=liquid,
         nominal=survey if isinstance(survey, NominalWall) else None,
         radii=radii,
+        rings=survey if isinstance(survey, RingedWall) else None,
     )
 
 

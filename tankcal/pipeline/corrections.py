@@ -101,12 +101,13 @@ def _known(job, survey):
 def _of_lengths(job):
     outside = job.survey.side == "outside"
     solid = job.horizontal or job.sphere
-    plates = any(c.thickness_m for c in job.courses) or (solid and solid.thickness_m)
+    parts = job.courses or job.rings
+    plates = any(c.thickness_m for c in parts) or (solid and solid.thickness_m)
     return (
         ("plate", outside and bool(plates), INSIDE_PLATE, ISO_7507),
         (
             "paint",
-            outside and any(c.paint_m for c in job.courses),
+            outside and any(c.paint_m for c in parts),
             INSIDE_PAINT,
             ISO_7507,
         ),

@@ -25,6 +25,7 @@ from tankcal.pipeline.wall_readings import (
     factors_of_plates,
     factors_of_readings,
     inputs_read_with,
+    names_of,
     noise_of,
     off_centre,
     readings_of_offsets,
@@ -57,8 +58,9 @@ class UprightAxis:
 
 
 @dataclass(frozen=True)
-class StrappedWall(ReadWall):
-    """The wall of a tank as strapped, with what a `ReadWall` has.
+class TapedWall(ReadWall):
+    """The courses of an upright tank, or the rings of a lying one, as strapped, with what a
+    `ReadWall` has.
 
     Attributes
     ----------
@@ -79,8 +81,6 @@ class StrappedWall(ReadWall):
     plate_sd_m: dict
     tapes: tuple
     shape_sd_m: float
-    shell = UprightAxis()
-    without_inputs = ("offset",)  # of points; a tape has one of its own
 
     @cached_property
     def radius_m(self):
@@ -105,15 +105,11 @@ class StrappedWall(ReadWall):
             tapes=self.tapes,
         )
 
-    def lowest_outline(self, azimuth_rad):
-        """(x, y) of the axis, and (n,) radii of the first course, m."""
-        return 0.0, 0.0, np.full(len(azimuth_rad), self.radius_m[0])
-
     def factors(self, job, weights):
         """`Factor`s of what the readings leave uncertain about features, (f, n) by their radii."""
-        used = self.accepted
+        used, names = self.accepted, names_of(job.courses or job.rings)
         sees = 1 - np.array([one.by_inputs.get("plate_thickness", 0.0) for one in used])
-        plates = factors_of_plates(job, self.field, weights * sees, self.plate_sd_m)
+        plates = factors_of_plates(names, self.field, weights * sees, self.plate_sd_m)
         return (*factors_of_readings(used, weights), *plates)
 
     def read_with(self, weights):
@@ -121,6 +117,18 @@ class StrappedWall(ReadWall):
         that lines inside do not see.
         """
         return inputs_read_with(self.accepted, weights)
+
+
+@dataclass(frozen=True)
+class StrappedWall(TapedWall):
+    """The wall of an upright tank as strapped."""
+
+    shell = UprightAxis()
+    without_inputs = ("offset",)  # of points; a tape has one of its own
+
+    def lowest_outline(self, azimuth_rad):
+        """(x, y) of the axis, and (n,) radii of the first course, m."""
+        return 0.0, 0.0, np.full(len(azimuth_rad), self.radius_m[0])
 
 
 def find_strapped_wall(job, progress, amplitudes=None):
@@ -158,7 +166,7 @@ def find_strapped_wall(job, progress, amplitudes=None):
     joints, zero = joints_of(job), shell_zero(job, None)
     former = readings_of_untold(job, told_courses(job, set()), joints, zero)
     readings, places = readings + former, places + [-1] * len(former)
-    readings, tested, field = _adjusted(
+    readings, tested, field = adjust_readings(
         readings, (joints, zero, nominal), amplitudes, snooping=job.snooping
     )
     return StrappedWall(
@@ -176,7 +184,7 @@ def find_strapped_wall(job, progress, amplitudes=None):
     )
 
 
-def _adjusted(readings, sizes, amplitudes, *, snooping):
+def adjust_readings(readings, sizes, amplitudes, *, snooping):
     """Readings with the eccentricity of their rings, what became of each, and `WallField`.
 
     sizes  joints, the table's zero above the bottom, and the nominal radius, m

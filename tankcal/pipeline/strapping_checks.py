@@ -26,9 +26,12 @@ DRAWS = 1000  # of sound shells
 APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826  # of differences within a course
 
 
-def limit_of_repeats(circumference_m):
-    """By how much repeats of such a circumference may differ, m."""
-    return limit_at("strapping", "repeats", "limit_mm", circumference_m) / 1000
+def limit_of_repeats(circumference_m, table="repeats"):
+    """By how much repeats of such a circumference may differ, m.
+
+    table  of the rule file: "repeats", or "repeats_lying"
+    """
+    return limit_at("strapping", table, "limit_mm", circumference_m) / 1000
 
 
 def check_strapped(job, wall):
@@ -36,7 +39,7 @@ def check_strapped(job, wall):
     straps = wall.straps
     return (
         *check_tapes(job, straps),
-        *_of_repeats(straps),
+        *check_repeats(straps),
         *_of_pairs(job, straps),
         *(_of_courses(job, straps) if job.radii is None else ()),  # else not all were strapped
         *_of_first_course(job, straps),
@@ -48,7 +51,7 @@ def check_straps_beside_points(job, straps):
     """`Problem`s of straps round a wall that points show."""
     return (
         *check_tapes(job, straps),
-        *_of_repeats(straps),
+        *check_repeats(straps),
         *_of_contradicted(straps),
     )
 
@@ -87,8 +90,8 @@ def _problem(text, strap=None, column="reading_m"):
     return Problem(FILE, text, row=None if strap is None else strap.row, column=column)
 
 
-def _of_repeats(straps):
-    """Repeats that differ by more than they may."""
+def check_repeats(straps, table="repeats"):
+    """`Problem`s of repeats that differ by more than they may; table as in `limit_of_repeats`."""
     by_name = {}
     for one in straps.reduced:
         by_name.setdefault(one.strap.name, []).append(one)
@@ -96,7 +99,7 @@ def _of_repeats(straps):
         if len(several) < 2:
             continue
         found = [one.circumference_m for one in several]
-        limit = limit_of_repeats(found[0])
+        limit = limit_of_repeats(found[0], table)
         if max(found) - min(found) > limit:
             text = message(
                 "repeats_apart",
@@ -111,10 +114,29 @@ def _of_repeats(straps):
 
 def _of_pairs(job, straps):
     """A strap that stands far from the others of its course, further than courses taper."""
+    for size, one, count, usual in straps_apart([course.name for course in job.courses], straps):
+        text = message(
+            "strap_apart",
+            "the {count} straps of course {course!r} differ by {apart_mm:.1f} mm, those of"
+            " other courses by {usual_mm:.1f} mm: is one of them misread, over an obstruction"
+            " or not level?",
+            count=count,
+            course=one.strap.course,
+            apart_mm=1000 * size,
+            usual_mm=1000 * usual,
+        )
+        yield _problem(text, one.strap)
+
+
+def straps_apart(names, straps):
+    """(size m, `Reduced`, count, usual m) of straps far from the others of their course or ring.
+
+    names  of the courses or rings
+    """
     adjusted = [straps.reduced[i] for i in straps.adjusted]
     apart = []
-    for course in job.courses:
-        own = [one for one in adjusted if one.strap.course == course.name]
+    for name in names:
+        own = [one for one in adjusted if one.strap.course == name]
         levels = {one.strap.level_m for one in own}
         if len(levels) > 1:
             found = np.array([one.circumference_m for one in own])
@@ -125,17 +147,7 @@ def _of_pairs(job, straps):
     usual = SCALE_OF_MEDIAN * float(np.median([size for size, _, _ in apart]))
     for size, one, count in apart:
         if size > max(APART_SDS * usual, 2 * limit_of_repeats(one.circumference_m)):
-            text = message(
-                "strap_apart",
-                "the {count} straps of course {course!r} differ by {apart_mm:.1f} mm, those of"
-                " other courses by {usual_mm:.1f} mm: is one of them misread, over an obstruction"
-                " or not level?",
-                count=count,
-                course=one.strap.course,
-                apart_mm=1000 * size,
-                usual_mm=1000 * usual,
-            )
-            yield _problem(text, one.strap)
+            yield size, one, count, usual
 
 
 def _of_courses(job, straps):
@@ -282,9 +294,7 @@ def _steps(radii_m):
 
 def _uncontrolled(job, wall):
     """Courses of one reading alone: a blunder in it nothing would show."""
-    read = [one.course for one in wall.accepted if one.of != FORMER]
-    counts = np.bincount(read, minlength=len(job.courses))
-    alone = [course.name for course, count in zip(job.courses, counts, strict=True) if count == 1]
+    alone = read_once([course.name for course in job.courses], wall)
     if alone:
         yield _problem(
             message(
@@ -294,3 +304,10 @@ def _uncontrolled(job, wall):
             ),
             column="course",
         )
+
+
+def read_once(names, wall):
+    """Those of the courses or rings that a single reading tells."""
+    read = [one.course for one in wall.accepted if one.of != FORMER]
+    counts = np.bincount(read, minlength=len(names))
+    return [name for name, count in zip(names, counts, strict=True) if count == 1]

@@ -18,6 +18,7 @@ from tankcal.pipeline.hit_wall import find_hit_wall
 from tankcal.pipeline.nominal_wall import find_nominal_wall
 from tankcal.pipeline.partial_survey import update_by_survey
 from tankcal.pipeline.radii_wall import RadiiWall, find_radii_wall
+from tankcal.pipeline.ringed_wall import find_ringed_wall
 from tankcal.pipeline.scan import Scan, fit_scan
 from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.survey_warnings import refuse_undetermined
@@ -137,6 +138,8 @@ def _adjusted(job, progress):
 
 def _survey(job, progress, dof, amplitudes):
     """What was surveyed: a wall of courses, a mesh, the scan of another wall; None: sizes alone."""
+    if job.rings:
+        return find_ringed_wall(job, progress, amplitudes)
     if job.strapping is not None and job.points is None:
         return find_strapped_wall(job, progress, amplitudes)
     if job.radii is not None and job.points is None:

@@ -15,6 +15,8 @@ from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
 from tankcal.pipeline.hit_checks import check_hits
 from tankcal.pipeline.line_checks import check_leans, check_lines
 from tankcal.pipeline.radii_wall import RadiiWall
+from tankcal.pipeline.ring_checks import check_rings
+from tankcal.pipeline.ringed_wall import RingedWall
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.strapping_checks import check_strapped, check_straps_beside_points
@@ -182,6 +184,8 @@ def _doubts_of_survey(job, survey, top_m):
         return (*check_strapped(job, survey), *check_lines(job, survey))
     if isinstance(survey, Scan):
         return check_scan(job, survey, top_m)
+    if isinstance(survey, RingedWall):
+        return check_rings(job, survey)
     return () if survey is None else check_mesh(job, top_m)
 
 

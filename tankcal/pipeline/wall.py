@@ -32,6 +32,7 @@ from tankcal.pipeline.wall_readings import (
     factors_of_plates,
     factors_of_readings,
     inputs_read_with,
+    names_of,
     noise_by_inputs,
 )
 from tankcal.pipeline.wall_straps import PointsOfWall, Straps, join_readings, told_courses
@@ -123,7 +124,7 @@ class Wall:
         taken = [one.by_inputs.get("plate_thickness", 0.0) for one in self.readings]
         sees = np.append(np.full(self._points, outside), outside - np.array(taken))
         gauged = {} if self.straps is None else self.straps.plate_sd_m
-        plates = factors_of_plates(job, self.field, weights * sees, gauged)
+        plates = factors_of_plates(names_of(job.courses), self.field, weights * sees, gauged)
         return (*found, *factors_of_readings(self.readings, weights[:, self._points :]), *plates)
 
     def read_with(self, weights):

@@ -181,6 +181,11 @@ def sites_of(readings, joints_m, zero_m):
     )
 
 
+def names_of(courses):
+    """Names of courses, or of rings."""
+    return [one.name for one in courses]
+
+
 def noise_of(readings):
     """(n, n) covariance of the radii: what each reading has of its own, and what they share."""
     shared = shared_effects(readings).values()
@@ -261,15 +266,16 @@ def factors_of_readings(readings, weights):
     return tuple(one for one in found if np.any(one.columns))
 
 
-def factors_of_plates(job, field, weights, plate_sd_m):
+def factors_of_plates(names, field, weights, plate_sd_m):
     """`Factor`s of plates that a gauge read, (f, n) weights being of readings that see them.
 
+    names       of the courses
     plate_sd_m  {course index: standard uncertainty}
     """
     found = []
     for course, sd in plate_sd_m.items():
         by = weights @ (sd * (field.sites.course == course))
-        found.append(Factor("plate_readings", by[:, None], note=job.courses[course].name))
+        found.append(Factor("plate_readings", by[:, None], note=names[course]))
     return tuple(one for one in found if np.any(one.columns))
 
 

@@ -135,9 +135,11 @@ class Straps:
 
 
 def gauged_plates(job):
-    """{course index: standard uncertainty of its plate by a gauge} of a strapped job."""
-    read = job.strapping.plate_sd_m
-    return {i: read[one.name] for i, one in enumerate(job.courses) if one.name in read}
+    """{index of a course or ring: standard uncertainty of its plate by a gauge} of a strapped
+    job.
+    """
+    read, parts = job.strapping.plate_sd_m, job.courses or job.rings
+    return {i: read[one.name] for i, one in enumerate(parts) if one.name in read}
 
 
 def mean_radii(field):

@@ -1,6 +1,6 @@
 """The keys of plan.toml and the columns of its tables that a job does not have."""
 
-from tankcal.job.contract import COLUMNS
+from tankcal.job.contract import columns_of
 from tankcal.job.fields import Field
 from tankcal.messages import message
 from tankcal.planning.fields import count, number, numbers_list
@@ -156,7 +156,7 @@ _READINGS = count("readings", "how often it is measured; blank: 1", high=100)
 
 
 def _without_values(table, *values):
-    kept = tuple(field for field in COLUMNS[table] if field.name not in (*values, "use"))
+    kept = tuple(field for field in columns_of(table) if field.name not in (*values, "use"))
     return (*kept, _READINGS)
 
 

@@ -92,7 +92,7 @@ def strapping_of(result):
 
 def _readings(result):
     straps = result.straps
-    names = [course.name for course in result.job.courses]
+    names = [part.name for part in result.job.courses or result.job.rings]
     of_course = dict(zip(names, straps.circumference_m, strict=True))
     w, mdb = np.full((2, len(straps.reduced)), np.nan)
     w[straps.adjusted], mdb[straps.adjusted] = straps.w, straps.mdb_m
@@ -131,9 +131,18 @@ def _tape(tape, sd, given):
     )
 
 
+def _radius_sds(result):
+    """(courses or rings,) standard deviations of the mean radii as measured."""
+    if result.rings is not None:
+        scale = result.body.parts[0].scale
+        return result.rings.radius_sd_m(result.body.parts[0].factors) / scale
+    shell = surveyed_shell(result)
+    return [radius_sd(shell, course) for course in result.body.shell.volume.courses]
+
+
 def _courses(result):
-    straps, found = result.straps, []
-    for index, course in enumerate(result.job.courses):
+    straps, found, sds = result.straps, [], _radius_sds(result)
+    for index, course in enumerate(result.job.courses or result.job.rings):
         radius, whole = straps.radius_m[index], straps.circumference_m[index]
         found.append(
             StrapOfCourse(
@@ -141,9 +150,7 @@ def _courses(result):
                 circumference_m=whole,
                 area_term_m=FULL_TURN * radius - whole,
                 radius_m=radius,
-                radius_sd_m=radius_sd(
-                    surveyed_shell(result), result.body.shell.volume.courses[index]
-                ),
+                radius_sd_m=sds[index],
                 thickness_m=course.thickness_m,
                 plate_sd_m=straps.plate_sd_m.get(index),
                 paint_m=course.paint_m,

@@ -152,6 +152,7 @@ def choices_of(result):
         **(_strapped_choices(job) if result.strapped is not None else {}),
         **_liquid_choices(result),
         **_radii_choices(result),
+        **_ring_choices(result),
         **({"form": "learned"} if result.scan is not None and job.horizontal is not None else {}),
         "thickness": _thickness_choice(job, result),
         "temperature": _temperature_choice(job),
@@ -240,6 +241,19 @@ def _strapped_choices(job):
         "tilt": "not_measured" if job.lines is None else "not_applied",
         "course_heights": "along_axis",
         "roof": _fitting_choice(job.switches.roof, roof, roof),
+        "form": "learned",
+    }
+
+
+def _ring_choices(result):
+    """What was assumed about rings that a tape was put round."""
+    if result.rings is None:
+        return {}
+    shape_mm = 1000 * result.rings.shape_sd_m
+    return {
+        "survey": "strapping_rings",
+        "area_term": shape_mm or "none",
+        "between_sections": "rings",
         "form": "learned",
     }
 
@@ -333,7 +347,8 @@ def _thickness_choice(job, result):
     if job.survey.side == "inside":
         return "inside"
     solid = job.horizontal or job.sphere
-    given = any(c.thickness_m + c.paint_m for c in job.courses) or (solid and solid.thickness_m)
+    parts = job.courses or job.rings
+    given = any(c.thickness_m + c.paint_m for c in parts) or (solid and solid.thickness_m)
     if not given:
         return "none"
     return "subtracted" if job.switches.plate and job.switches.paint else "off"
@@ -427,7 +442,14 @@ def _of_lying(result):
         dip_direction=(tank.dip_direction, None),
         **_of_scan(result),
         full_capacity=(result.body.parts[0].capacity_m3, "m3"),
+        **(_unread(tank, result.zero_m) if result.job.rings else {}),
     )
+
+
+def _unread(tank, zero_m):
+    """What no dip reads: room below dip 0, and above the highest dip."""
+    below = float(tank.volume_m3([zero_m])[0])
+    return {"below_zero": (below, "m3"), "left_at_full": (tank.left_m3, "m3")}
 
 
 def _of_scan(result):

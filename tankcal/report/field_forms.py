@@ -1,7 +1,7 @@
 """Field sheets of a starter job: its tables of readings as a crew fills them in by pen."""
 
-from tankcal.job.contract import COLUMNS, SURVEYS
-from tankcal.job.starter.form import DECLARED, METERED, OF_SHELLS
+from tankcal.job.contract import columns_of
+from tankcal.job.starter.form import DECLARED, METERED, OF_SHELLS, Form
 from tankcal.job.starter.texts import parted, texts_in
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
@@ -9,6 +9,7 @@ from tankcal.report.plain import PlainPaper
 FILE = "field-sheets.pdf"
 BY_PEN = (*(one for one in OF_SHELLS if one != DECLARED), METERED)  # that a crew writes down
 FORMS = (  # tables of each, read in one go, and the rows that a sheet has room for
+    (("rings",), 12),
     (("lines",), 12),
     (("offsets",), 30),
     (("setups",), 9),
@@ -45,7 +46,7 @@ def is_filled_by_pen(survey):
     return survey in BY_PEN
 
 
-def write_field_sheets(path, survey, language):
+def write_field_sheets(path, survey, language, kind="vertical"):
     """Write the field sheets of a survey as a PDF.
 
     Parameters
@@ -56,14 +57,16 @@ def write_field_sheets(path, survey, language):
         "strapping", "reference-line", "wall-hits", "tangents" or "liquid".
     language : str
         One of `languages.LANGUAGES`.
+    kind : str
+        Of tank.
     """
     from tankcal.report.pdf import pdf
 
-    found = sheets(survey, language)
+    found = sheets(survey, language, kind)
     path.write_bytes(pdf([block.data for block in found], path.parent))
 
 
-def sheets(survey, language):
+def sheets(survey, language, kind="vertical"):
     """The blocks of the field sheets."""
     texts = texts_in(language)
     paper = PlainPaper(texts.words)
@@ -82,12 +85,13 @@ def sheets(survey, language):
     if survey == METERED:
         found.append(blocks.paragraph(paper.word("forms.batches")))
         found += [*_meters(paper, texts), *_valves(paper)]
-    forms = [(names, rows) for names, rows in FORMS if set(names) <= set(SURVEYS[survey])]
-    if any(_is_angle(field) for names, _ in forms for field in _columns(names)):
+    tables = set(Form(kind, survey, language).tables)
+    forms = [(names, rows) for names, rows in FORMS if set(names) <= tables]
+    if any(_is_angle(field) for names, _ in forms for field in _columns(names, kind)):
         found.append(blocks.paragraph(paper.word("forms.angles")))
     for names, rows in forms:
         titles = [texts.words["input"]["titles"][name] for name in names]
-        columns = [_column(texts, field) for field in _columns(names)]
+        columns = [_column(texts, field) for field in _columns(names, kind)]
         found.append(blocks.heading("; ".join(titles)))
         if names == ("liquid",):  # a meter shows a sum, of which the office takes differences
             columns = [(heading, unit, 1.0) for heading, unit, _ in columns]
@@ -153,12 +157,12 @@ def _code(survey):
     return survey.replace("-", "_")
 
 
-def _columns(tables):
+def _columns(tables, kind):
     """The columns of tables that are filled in side by side, each once; heights of targets last."""
     found = {
         field.name: field
         for table in tables
-        for field in COLUMNS[table]
+        for field in columns_of(table, kind)
         if field.name not in IN_THE_OFFICE and not field.name.endswith(OTHER_UNITS)
     }
     return sorted(found.values(), key=lambda field: field.name == "target_height_m")

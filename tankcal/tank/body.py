@@ -16,7 +16,10 @@ from tankcal.tank.volumes import ShellVolume
 from tankcal.uncertainty import declared_source, group_correlated
 
 OWN_SCALE = "instrument_scale"  # kind of a cause that stands for the input "scale"
-MEASURED = ("diameter", "length", "end_depth", "dip_position", "plate_thickness")  # at its warmth
+MEASURED = (  # at its warmth
+    *("diameter", "length", "end_depth", "dip_position", "plate_thickness"),
+    *("paint", "ring_lengths", "ring_axes"),
+)
 ROUNDED_M = 0.001  # that the last dip of a table, a whole millimetre, stands above the top at most
 LEVELS = 9  # from empty to full, at which inputs are asked whether they move the volume
 
@@ -140,6 +143,9 @@ class SolidPart(Part):
         How that wall departs from the solid, with what the survey leaves uncertain of its volumes.
     unused : tuple of str
         Names of the solid's inputs that have no meaning in this job.
+    read_with : dict
+        {input: (f,) derivative of the surveyed inputs by it}, of inputs that the readings of the
+        survey depend on: the temperature of a tape that has that of the shell.
     """
 
     solid: Part
@@ -150,6 +156,7 @@ class SolidPart(Part):
     factors: tuple[Factor, ...] = ()
     form: SurveyedForm | None = None
     unused: tuple[str, ...] = ()
+    read_with: dict = field(default_factory=dict)
 
     @property
     def top_m(self):
@@ -187,6 +194,10 @@ class SolidPart(Part):
             found["expansion"] = (self.scale - 1) / self.expansion_per_k * by_length
         if "diameter" in self.surveyed:
             found["offset"] = 2 * found["diameter"]
+        if self.read_with:
+            by_survey = self._by_survey(found)
+            for name, column in self.read_with.items():
+                found[name] = found.get(name, 0.0) + by_survey @ column
         without = {*self.unused, *self.surveyed}
         return {name: one for name, one in found.items() if name not in without}
 
@@ -196,11 +207,14 @@ class SolidPart(Part):
         if not self.surveyed:
             return own
         if self.form is None:
-            found = self.solid.derivatives(levels_m)
-            by_survey = np.column_stack([found[name] for name in self.surveyed])
+            by_survey = self._by_survey(self.solid.derivatives(levels_m))
             return (*(one.source(by_survey @ one.columns) for one in self.factors), *own)
         weights = self.form.at(self._shares(levels_m))
         return (*(one.source(weights @ one.columns) for one in self.form.factors), *own)
+
+    def _by_survey(self, found):
+        """(rows, f) derivatives by the inputs that the survey gave, of those by all."""
+        return np.column_stack([found[name] for name in self.surveyed])
 
     @property
     def _stretch(self):

@@ -308,6 +308,10 @@ class Cut:
         """Derivative of S by the input "end_plate", m2 per m."""
         return self.arc.square_by("end_plate", self.parameter) * self.wet_angle()
 
+    def by_wave(self, order):
+        """Derivative of S by a wave cos(order a) of the radius, a from the bottom, m2 per m."""
+        return 2 * self.radius_m * np.sin(order * self.wet_angle()) / order
+
     def _above_bottom(self):
         return np.maximum(self.radius_m + self.height_m, 0.0)
 

@@ -9,17 +9,24 @@ from functools import cached_property
 
 import numpy as np
 
-from tankcal.errors import HeightError, SolutionError
-from tankcal.messages import message
-from tankcal.tank.heads import Cut, EllipseArc, End, Line, depth_of, integrate, meridian
+from tankcal.tank.heads import Cut, End, Line
+from tankcal.tank.lying import (
+    LyingSolid,
+    Piece,
+    check_dip,
+    check_directions,
+    levels_inside,
+    pieces_of_ends,
+    refuse_meeting_ends,
+    require_length,
+)
 from tankcal.tank.parts import Part
 
-ROUNDING = 1e-9  # of the highest dip: a dip so little outside is the top or the bottom itself
 FLAT = End("flat")
 
 
 @dataclass(frozen=True)
-class LyingTank(Part):
+class LyingTank(LyingSolid):
     """A lying cylinder, round or elliptical, between two ends, tilted and rolled: exact.
 
     The zero is the lowest point of the section at dip_from_a_m, where the plumb line touches the
@@ -71,62 +78,19 @@ class LyingTank(Part):
     dip_direction: str = "plumb"
 
     def __post_init__(self):
-        _above_zero("width", self.width_m)
-        _above_zero("height", self.height_m)
-        _above_zero("length", self.length_m)
-        if self.dip_direction not in ("plumb", "square"):
-            raise SolutionError(f"dip direction {self.dip_direction!r}: expected plumb or square")
-        if not np.isfinite(self.tilt) or not np.isfinite(self.roll_rad):
-            raise SolutionError(f"tilt {self.tilt} and roll {self.roll_rad}: expected numbers")
-        depths = [(depth_of(end, self._radius_m), end) for end in (self.end_a, self.end_b)]
-        inward = sum(depth for depth, end in depths if end.inward)
-        if inward > self.length_m:
-            raise SolutionError(
-                message(
-                    "ends_meet",
-                    "ends that bulge {inward_m:g} m inwards meet in a cylinder of {length_m:g} m",
-                    inward_m=inward,
-                    length_m=self.length_m,
-                )
-            )
-        self._check_dip()
-
-    def _check_dip(self):
-        low, high = self.dip_from_a_m, self.dip_from_a_m
-        if self.dip_direction == "plumb":
-            high += 2 * self._half_height_m * self.tilt
-        slack = ROUNDING * self.length_m
-        if min(low, high) < -slack or max(low, high) > self.length_m + slack:
-            raise SolutionError(
-                message(
-                    "dip_off_cylinder",
-                    "the dip touches the bottom {low_m:g} m and leaves the top {high_m:g} m from "
-                    "the start of the cylinder: expected both between 0 and {length_m:g} m",
-                    low_m=low,
-                    high_m=high,
-                    length_m=self.length_m,
-                )
-            )
+        require_length("width", self.width_m)
+        require_length("height", self.height_m)
+        require_length("length", self.length_m)
+        check_directions(self.dip_direction, self.tilt, self.roll_rad)
+        ends = (self.end_a, self._radius_m), (self.end_b, self._radius_m)
+        refuse_meeting_ends(ends, self.length_m)
+        shift = 2 * self._half_height_m * self.tilt
+        check_dip(self.dip_from_a_m, self.dip_direction, shift, self.length_m)
 
     @property
     def top_m(self):
         """The highest dip."""
         return 2 * self._half_height_m * self._stretch
-
-    @cached_property
-    def capacity_m3(self):
-        """Volume of the full tank."""
-        full = np.array([2 * self._radius_m])
-        pieces = self._pieces
-        return float(sum(p.sign * integrate(p.arc, full, 0.0, [Cut.segment])[0, 0] for p in pieces))
-
-    def volume_m3(self, levels_m):
-        """(rows,) volume below each dip."""
-        return self._sum(levels_m, Cut.segment)
-
-    def area_m2(self, levels_m):
-        """(rows,) derivative of the volume by the dip; the free surface, when the dip is plumb."""
-        return self._squeeze * self._stretch * self._sum(levels_m, Cut.chord)
 
     def derivatives(self, levels_m):
         """{input: (rows,)} derivative of the volume at a fixed dip by each input, all else fixed.
@@ -147,10 +111,7 @@ class LyingTank(Part):
         integrands += [Cut.by_radius, Cut.by_end_depth, Cut.by_end_plate]
         found = [(piece, self._integrals(piece, levels_m, integrands)) for piece in self._pieces]
         volume, surface, _, by_radius, by_depth, _ = sum(one for _, one in found)
-        moment = sum(  # of the free surface about the place of the dip
-            (piece.origin_m - self.dip_from_a_m) * one[1] + piece.way * one[2]
-            for piece, one in found
-        )
+        moment = sum(self._moment(piece, one[1], one[2]) for piece, one in found)
         surface_of_b = sum(one[1] for piece, one in found if piece.end == "b")
         by_plate = sum(piece.sign * one[5] for piece, one in found)
         levels = np.asarray(levels_m, dtype=float)
@@ -173,43 +134,13 @@ class LyingTank(Part):
 
     @cached_property
     def _pieces(self):
-        """Arcs of the meridian with their place along the axis, s = origin + way x."""
         barrel = Line(0.0, self.length_m, self._radius_m, 0.0, {"radius": (1.0, 0.0)})
-        pieces = [_Piece(barrel, 0.0, 1, 1, "")]
-        ends = (("a", self.end_a, 0.0, -1), ("b", self.end_b, self.length_m, 1))
-        for name, end, origin, out in ends:
-            sign = -1 if end.inward else 1
-            for arc in meridian(end, self._radius_m):
-                pieces.append(_Piece(arc, origin, sign * out, sign, name))
-        return tuple(pieces)
+        ends = (self.end_a, self._radius_m), (self.end_b, self._radius_m)
+        return Piece(barrel, 0.0, 1, 1, ""), *pieces_of_ends(ends, self.length_m)
 
-    def _sum(self, levels_m, integrand):
-        """(rows,) integral over the whole tank; equal ends of a level one are integrated once."""
-        pieces, twins = self._pieces, self.tilt == 0 and self.end_a == self.end_b
-        if twins:
-            pieces = [piece for piece in pieces if piece.end != "b"]
-        return sum(
-            (2 if twins and piece.end == "a" else 1)
-            * self._integrals(piece, levels_m, [integrand])[0]
-            for piece in pieces
-        )
-
-    def _integrals(self, piece, levels_m, integrands):
-        """(integrands, rows) over one piece, of the round tank."""
-        level = self._liquid_m(levels_m, piece.origin_m)
-        slope = piece.way * self._squeeze * self.tilt
-        return piece.sign * integrate(piece.arc, level, slope, integrands)
-
-    def _section_m2(self, levels_m, s):
-        """(rows,) wet part of the cylinder's section at s."""
-        barrel = self._pieces[0].arc
-        return Cut(barrel, s, s, self._radius_m, self._liquid_m(levels_m, s)).segment()
-
-    def _liquid_m(self, levels_m, s):
-        """(rows,) height of the liquid above the axis at s, in the round tank of equal area."""
-        levels = _inside(levels_m, self.top_m)
-        above_dip_zero = self._stretch * levels - self.tilt * (s - self.dip_from_a_m)
-        return self._squeeze * above_dip_zero - self._radius_m
+    @property
+    def _has_twins(self):
+        return self.tilt == 0 and self.end_a == self.end_b
 
     @cached_property
     def _radius_m(self):
@@ -234,20 +165,6 @@ class LyingTank(Part):
         radius = (self.width_m + self.height_m) / (8 * self._radius_m)
         half = (self.width_m * sin2 + self.height_m * cos2) / (4 * self._half_height_m)
         return radius, (radius - self._squeeze * half) / self._half_height_m
-
-    @property
-    def _stretch(self):
-        """Heights square to the axis to dips."""
-        return np.hypot(1.0, self.tilt) if self.dip_direction == "plumb" else 1.0
-
-
-@dataclass(frozen=True)
-class _Piece:
-    arc: Line | EllipseArc
-    origin_m: float
-    way: int
-    sign: int
-    end: str
 
 
 @dataclass(frozen=True)
@@ -277,7 +194,7 @@ class Sphere(Part):
     diameter_m: float
 
     def __post_init__(self):
-        _above_zero("diameter", self.diameter_m)
+        require_length("diameter", self.diameter_m)
 
     @property
     def top_m(self):
@@ -291,12 +208,12 @@ class Sphere(Part):
 
     def volume_m3(self, levels_m):
         """(rows,) volume below each dip."""
-        d = _inside(levels_m, self.top_m)
+        d = levels_inside(levels_m, self.top_m)
         return np.pi * d**2 * (1.5 * self.diameter_m - d) / 3
 
     def area_m2(self, levels_m):
         """(rows,) free surface, pi d (D - d)."""
-        d = _inside(levels_m, self.top_m)
+        d = levels_inside(levels_m, self.top_m)
         return np.pi * d * (self.diameter_m - d)
 
     def derivatives(self, levels_m):
@@ -307,7 +224,7 @@ class Sphere(Part):
         datum            height of the liquid at a given dip
         scale            of the diameter, but not of the dips
         """
-        d = _inside(levels_m, self.top_m)
+        d = levels_inside(levels_m, self.top_m)
         by_diameter = np.pi * d**2 / 2
         return {
             "diameter": by_diameter,
@@ -315,24 +232,3 @@ class Sphere(Part):
             "datum": self.area_m2(levels_m),
             "scale": self.diameter_m * by_diameter,
         }
-
-
-def _inside(levels_m, top_m):
-    levels = np.asarray(levels_m, dtype=float)
-    slack = ROUNDING * top_m
-    outside = ~((levels >= -slack) & (levels <= top_m + slack))
-    if np.any(outside):
-        raise HeightError(
-            message(
-                "dip_outside_tank",
-                "dip {dip_m:g} m is outside the tank (0 to {top_m:g} m)",
-                dip_m=levels[outside][0],
-                top_m=top_m,
-            )
-        )
-    return levels
-
-
-def _above_zero(name, length_m):
-    if not 0 < length_m < np.inf:
-        raise SolutionError(f"{name} {length_m:g} m: expected a length above zero")

@@ -11,6 +11,8 @@ from tankcal.record import load as load_record
 from tankcal.record import read
 from tankcal.report.outputs import write
 from tankcal.report.paper import Paper
+from tankcal.report.tables.strapping import STRAPS, strapped_courses_of, straps_of
+from tankcal.text.words import load_words
 
 
 @pytest.fixture(scope="module")
@@ -112,3 +114,17 @@ def test_what_was_assumed_is_said(strapped):
     assert "offset" not in next(
         one["value"] for one in paper.record["choices"] if one["code"] == "not_in_budget"
     )
+
+
+@pytest.mark.parametrize("language", ["en", "pt-BR", "es"])
+def test_papers_of_a_lying_tank_speak_of_rings(language):
+    record = {"job": {"tank": {"kind": "horizontal"}}}
+    headings = load_words(language)["table_headings"]
+    for table in (straps_of(record), strapped_courses_of(record)):
+        shown = {one.key: one.heading for one in table.on_paper()}
+        assert shown["course"] == "ring"
+        assert headings["ring"] != headings["level_m"]
+    places = {one.key: one for one in straps_of(record).in_csv()}
+    assert (places["course"].csv, places["level_m"].csv) == ("ring", "from_a_m")
+    upright = {"job": {"tank": {"kind": "vertical"}}}
+    assert straps_of(upright) is STRAPS

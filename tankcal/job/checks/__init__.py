@@ -13,9 +13,11 @@ from tankcal.job.checks.extent import (
     has_radii,
     has_survey,
     has_wall_points,
+    height_of_rings,
     is_metered,
     is_sighted,
     is_strapped,
+    wall_of,
 )
 from tankcal.job.checks.geometry import check_cylinder, check_scan
 from tankcal.job.checks.hits import check_hits
@@ -23,6 +25,7 @@ from tankcal.job.checks.lines import check_lines
 from tankcal.job.checks.liquid import check_liquid
 from tankcal.job.checks.plausible import check_metering, check_plausible
 from tankcal.job.checks.radii import check_radii
+from tankcal.job.checks.rings import check_rings
 from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.strapping import check_strapping
 from tankcal.job.checks.survey import check_survey
@@ -58,6 +61,8 @@ def check_all(values, tables, registers, raw, is_whole, log):
             check_lines(values, tables, registers, raw, log)
             check_hits(values, tables, registers, raw, log)
             check_tangents(values, tables, registers, raw, log)
+        if kind_of(raw) == "horizontal":
+            check_rings(values, tables, registers, raw, log)
         check_clouds(values, tables, registers, raw, log)
         check_liquid(values, tables, registers, raw, log)
         if values is not None:
@@ -109,7 +114,7 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
     elif has_rows(points):
         check_scan(points, values, kind, raw, log)
     if kind == "horizontal":
-        check_horizontal(values, has_wall_points(tables), raw, log)
+        check_horizontal(values, wall_of(tables), raw, log, height_of_rings(tables))
     if kind == "sphere":
         check_sphere(values, has_wall_points(tables), raw, log)
     if tables["deadwood"] is not None:

@@ -1,5 +1,6 @@
 """Which inputs of uncertainty.csv have an effect on a job, and why the others have none."""
 
+from tankcal.job.checking import has_rows
 from tankcal.job.checks.extent import (
     has_clouds,
     has_hits,
@@ -8,6 +9,7 @@ from tankcal.job.checks.extent import (
     is_metered_alone,
     is_strapped,
     may_be_hit_from_both_sides,
+    wall_of,
 )
 from tankcal.job.contract import INPUTS
 from tankcal.job.contract.bottom import bottom_form
@@ -34,7 +36,7 @@ def useless_inputs(values, tables, kind):
         rules |= _of_vertical(values, tables)
         rules |= _of_radii() if has_radii_alone(tables) else {}
     elif kind == "horizontal":
-        rules |= _of_horizontal(values, has_wall_points(tables))
+        rules |= _of_horizontal(values, tables)
     elif kind == "sphere":
         rules |= _of_wall(values["sphere"], values, has_wall_points(tables))
     return others | {name: why for name, why in rules.items() if why}
@@ -137,12 +139,12 @@ def _of_bottom(values, bottom):
     }.get(bottom_form(values, bottom), "")
 
 
-def _of_plates(values, tables, is_loaded):
+def _of_plates(values, tables, is_loaded, of="courses"):
     """Plates count where they are subtracted or loaded, paint where it is subtracted.
 
     A tape sees both, also where the points are inside, and so do hits from outside beside them.
     """
-    switches, courses = values["corrections"], tables["courses"]
+    switches, courses = values["corrections"], tables[of]
     seen = is_strapped(tables) or may_be_hit_from_both_sides(tables)
     inside = (values["survey"]["side"] == "inside" and not seen) or has_radii_alone(tables)
     why = {"plate_thickness": "", "paint": ""}
@@ -155,8 +157,9 @@ def _of_plates(values, tables, is_loaded):
             if not why[name] and not any(courses.of(column)):
                 why[name] = message(
                     "no_such_thickness",
-                    "expected only with {column} above 0 in courses.csv",
+                    "expected only with {column} above 0 in {table}.csv",
                     column=column,
+                    table=of,
                 )
     return why
 
@@ -166,19 +169,48 @@ def _of_heights(courses):
     return message("only_one_course", "expected only with two courses or more") if is_one else ""
 
 
-def _of_horizontal(values, has_points):
+def _of_horizontal(values, tables):
     given, no_tilt = values["horizontal"], values["corrections"]["tilt"] is False
+    wall = wall_of(tables)
+    has_points = wall == "points"
     leans = has_points or (given["tilt_mm_per_m"] and not no_tilt)
     all_flat = given["end_a"] == given["end_b"] == "flat"
     switched_off = _switched_off("tilt") if no_tilt else ""
-    return _of_wall(given, values, has_points) | {
-        "end_depth": message("ends_are_flat", "expected only with an end that is not flat")
-        if all_flat
+    sizes = _of_rings(values, tables) if wall == "straps" else _of_one_cylinder()
+    return (
+        _of_wall(given, values, has_points)
+        | sizes
+        | {
+            "end_depth": message("ends_are_flat", "expected only with an end that is not flat")
+            if all_flat
+            else "",
+            "tilt": _from_points(has_points) or switched_off,
+            "dip_position": ""
+            if leans
+            else message("does_not_lean", "expected only for a tank that leans"),
+        }
+    )
+
+
+def _of_one_cylinder():
+    """What only rings have."""
+    no_rings = message("no_rings", "expected only with the rings of rings.csv")
+    return dict.fromkeys(("paint", "ring_lengths", "ring_axes"), no_rings)
+
+
+def _of_rings(values, tables):
+    """What a cylinder has whose rings a tape was put round."""
+    by_tape = message("by_tape", "its uncertainty comes from the readings of the tape")
+    one = "rings" in tables and has_rows(tables["rings"]) and len(tables["rings"].rows) == 1
+    why = _of_plates(values, tables, False, "rings")
+    return why | {
+        "diameter": by_tape,
+        "offset": by_tape,
+        "length": message("of_each_ring", "expected ring_lengths instead: each ring has its own"),
+        "ring_lengths": "",
+        "ring_axes": message("only_one_ring", "expected only with two rings or more")
+        if one
         else "",
-        "tilt": _from_points(has_points) or switched_off,
-        "dip_position": ""
-        if leans
-        else message("does_not_lean", "expected only for a tank that leans"),
     }
 
 

@@ -80,6 +80,24 @@ def has_wall_points(tables):
     return has_rows(tables["points"]) or has_survey(tables) or is_sighted(tables)
 
 
+def wall_of(tables):
+    """What the wall of a lying tank comes from: "points", "straps", or None: its sizes alone."""
+    if has_wall_points(tables):
+        return "points"
+    return "straps" if is_strapped(tables) or has_rows(tables.get("rings")) else None
+
+
+def height_of_rings(tables):
+    """About the inside diameter of strapped rings, m; None: nothing tells it."""
+    if not is_strapped(tables) or not has_rows(tables.get("rings")):
+        return None
+    readings = [one for one in tables["circumferences"].of("reading_m") if one is not None]
+    plates = [one for one in tables["rings"].of("thickness_mm") if one is not None]
+    if not readings:
+        return None
+    return float(np.median(readings) / np.pi - 2e-3 * (np.median(plates) if plates else 0.0))
+
+
 @dataclass(frozen=True)
 class Extent:
     """What is known of a tank's size before anything is computed; None: not known.
@@ -100,7 +118,7 @@ def extent_of(values, tables, kind):
     if kind == "vertical":
         return _of_vertical(values, tables["bottom"])
     if kind == "horizontal":
-        return _of_horizontal(values["horizontal"], values, has_wall_points(tables))
+        return _of_horizontal(values["horizontal"], values, wall_of(tables) is not None)
     if kind == "sphere":
         diameter = values["sphere"]["diameter_m"] or values["tank"]["nominal_diameter_m"]
         area = None if diameter is None else np.pi / 4 * diameter**2

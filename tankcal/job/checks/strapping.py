@@ -35,27 +35,32 @@ def check_strapping(values, tables, registers, raw, log):
     """Circumferences with a tape, on courses that are there; obstructions and checks that fit."""
     straps = tables["circumferences"]
     if not is_strapped(tables):
-        _tell_without_effect(tables, log)
+        tell_without_effect(tables, log)
         return
     if len(straps.rows) > MOST_STRAPS:
         log.problem(straps.file, too_many_straps(len(straps.rows)))
         return
-    tapes = tapes_of(registers)
     courses = tables["courses"]
     known = () if courses is None else tuple(courses.of("course"))
     alone = _stands_alone(tables, raw)
     every = alone and not has_radii(tables) and raw.tables.get("radii", ()) is not None
     _check_courses(straps, tables, courses, known, every, log)
+    check_readings(tables, registers, raw, log)
+    if has_rows(tables["thickness"]):
+        refuse_others(tables["thickness"], "course", known, log)
+    if values is not None:
+        check_strapping_settings(values, tables, registers, alone, raw, log)
+        check_levels(straps, courses, values, log)
+
+
+def check_readings(tables, registers, raw, log):
+    """The tapes that were read, what was in their way, and their comparison with a master."""
+    straps, tapes = tables["circumferences"], tapes_of(registers)
     _check_tapes(straps, registers["instruments"], tapes, raw, log)
     _check_obstructions(tables["obstructions"], set(straps.of("circumference")), log)
     if has_rows(tables["obstructions"]):
         check_spans(tables["obstructions"], straps, tapes_read(straps, tapes), tapes, raw, log)
-    if has_rows(tables["thickness"]):
-        refuse_others(tables["thickness"], "course", known, log)
     _check_comparisons(tables["tape_checks"], tapes, raw, log)
-    if values is not None:
-        _check_settings(values, tables, tapes, alone, raw, log)
-        check_levels(straps, courses, values, log)
 
 
 def _stands_alone(tables, raw):
@@ -81,7 +86,8 @@ def tapes_read(straps, tapes):
     return [name or usual for name in straps.of("instrument")]
 
 
-def _tell_without_effect(tables, log):
+def tell_without_effect(tables, log):
+    """Warnings about tables that belong to circumferences, where there are none."""
     for name in ("obstructions", "thickness", "tape_checks"):
         if has_rows(tables[name]):
             expected = message(
@@ -112,6 +118,14 @@ def _check_courses(straps, tables, courses, known, every, log):
                 file=straps.file,
             )
             log.problem(courses.file, expected, row, "course")
+    refuse_repeats_elsewhere(straps, "level_m", log)
+
+
+def refuse_repeats_elsewhere(straps, column, log):
+    """A problem for each reading that is not where others of its name are.
+
+    column  of its place, as the file has it
+    """
     places = {}
     names = zip(straps.rows, straps.of("circumference"), straps.of("course"),
                 straps.of("level_m"), strict=True)  # fmt: skip
@@ -127,7 +141,7 @@ def _check_courses(straps, tables, courses, known, every, log):
                 name=name,
                 row=first[1],
             )
-            log.problem(straps.file, expected, row, "level_m")
+            log.problem(straps.file, expected, row, column)
 
 
 def refuse_others(table, column, known, log):
@@ -274,7 +288,9 @@ def _check_comparisons(table, tapes, raw, log):
         log.problem(file, expected, rows.get(working[0]), f"{working[0]}.master")
 
 
-def _check_settings(values, tables, tapes, alone, raw, log):
+def check_strapping_settings(values, tables, registers, alone, raw, log):
+    """What a strapping needs of the settings; alone: nothing else tells the wall."""
+    tapes = tapes_of(registers)
     unknown = values["shell"]["shape_sd_mm"] is None
     if alone and unknown and is_not_given(raw, "shell", "shape_sd_mm"):
         expected = message(

@@ -15,6 +15,7 @@ from tankcal.job.contract import (
     liquid,
     points,
     radii,
+    rings,
     roof,
     stadia,
     stated,
@@ -43,7 +44,7 @@ SECTIONS = (
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES}
 COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | tangents.COLUMNS | stadia.COLUMNS
-COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS | SURVEY_COLUMNS
+COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS | rings.COLUMNS | SURVEY_COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS | radii.KEYS
 _KEYS |= {"bottom": bottom.KEYS, "roof": roof.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
@@ -72,6 +73,12 @@ for _group, _owners in {"keys": KEYS, "columns": COLUMNS, "entries": REGISTER_KE
     for _owner, _fields in _owners.items():  # so that a message says a note in its language
         NOTES.update({field.note: (_group, f"{_owner}.{field.name}") for field in _fields})
 
+
+def columns_of(table, kind="vertical"):
+    """The `Field`s of a table of a tank of a kind (None, not known: vertical)."""
+    return tuple(field for field in COLUMNS[table] if field.suits(kind or "vertical"))
+
+
 OPEN_SECTIONS = ("certificate",)  # hold text fields of the user's own, too
 
 __all__ = [
@@ -86,4 +93,5 @@ __all__ = [
     "REQUIRED_TABLES",
     "SURVEYS",
     "TABLES_OF_KIND",
+    "columns_of",
 ]

@@ -23,6 +23,15 @@ def no_courses():
     return message("no_courses", "no rows; expected one row for each course, from the bottom up")
 
 
+def thin_plate(thickness_mm):
+    """What is said of a plate that looks as if it were in metres."""
+    return message(
+        "thin_plate",
+        "found {thickness:g}; expected millimetres, 0 or at least 1: is it in metres?",
+        thickness=thickness_mm,
+    )
+
+
 def check_courses(courses, values, log):
     """Course names once; plates of a credible thickness; heights that add up to the shell's."""
     if courses.is_empty:
@@ -31,12 +40,7 @@ def check_courses(courses, values, log):
     refuse_repeated(courses, "course", log)
     for row, thickness in zip(courses.rows, courses.of("thickness_mm"), strict=True):
         if thickness is not None and 0 < thickness < SMALLEST_THICKNESS_MM:
-            expected = message(
-                "thin_plate",
-                "found {thickness:g}; expected millimetres, 0 or at least 1: is it in metres?",
-                thickness=thickness,
-            )
-            log.problem(courses.file, expected, row, "thickness_mm")
+            log.problem(courses.file, thin_plate(thickness), row, "thickness_mm")
     heights, nominal = courses.of("height_m"), values["tank"]["nominal_height_m"]
     if None in heights or courses.skipped:
         return  # a course that cannot be read is told already

@@ -2,4 +2,6 @@
 
 KINDS = ("vertical", "horizontal", "sphere", "mesh")
 VERTICAL = ("vertical",)
+LYING = ("horizontal",)
+STRAPPED = ("vertical", "horizontal")
 WITH_POINTS = ("vertical", "horizontal", "sphere")

@@ -120,14 +120,22 @@ RADII = ("dish_radius_m", "knuckle_radius_m")
 ROUND_ONLY = ("torispherical", "spherical")
 
 
-def check_horizontal(values, has_points, raw, log):
-    """Sizes, ends, tilt and dip point of a horizontal cylinder."""
+def check_horizontal(values, wall, raw, log, height_m=None):
+    """Sizes, ends, tilt and dip point of a horizontal cylinder.
+
+    wall      what it comes from: "points", "straps", or None: the sizes
+    height_m  of the cylinder where a tape tells it, about
+    """
+    has_points = wall == "points"
 
     def tell_problem(key, expected):
         tell(log.problem, raw, "horizontal", key, expected)
 
     given = values["horizontal"]
-    _check_thickness(given, values["survey"]["side"], "horizontal", raw, log)
+    if wall == "straps":
+        _check_ringed(given, raw, log)
+    else:
+        _check_thickness(given, values["survey"]["side"], "horizontal", raw, log)
     if has_points:
         _refuse_given(given, (*SIZES, "tilt_mm_per_m"), raw, log)
         for key, expected in (
@@ -150,7 +158,8 @@ def check_horizontal(values, has_points, raw, log):
             if is_not_given(raw, "horizontal", key):
                 tell_problem(key, expected)
     else:
-        _check_sizes(given, raw, log)
+        if wall is None:
+            _check_sizes(given, raw, log)
         if given["azimuth_deg"] is not None:
             tell_problem(
                 "azimuth_deg",
@@ -160,8 +169,28 @@ def check_horizontal(values, has_points, raw, log):
                 ),
             )
     for end in ("end_a", "end_b"):
-        _check_end(given, end, has_points, raw, log)
-    _check_dip(given, raw, log)
+        _check_end(given, end, wall is not None, raw, log)
+    _check_dip(given, height_m, raw, log)
+
+
+def _check_ringed(given, raw, log):
+    """Rings have sizes and plates of their own; thickness_mm is of the ends alone."""
+    for key in (*SIZES, "roll_deg"):
+        if given[key]:
+            expected = message(
+                "size_beside_rings",
+                "given together with circumferences by tape; expected only one of them: the rings"
+                " are round, and have their sizes from these",
+            )
+            tell(log.problem, raw, "horizontal", key, expected)
+    curved = any(given[end] not in (None, "flat") for end in ("end_a", "end_b"))
+    if curved and is_not_given(raw, "horizontal", "thickness_mm"):
+        expected = message(
+            "end_thickness_missing",
+            "missing; expected plate and paint of the ends, which are subtracted from their depths"
+            " or radii (0: these are inside)",
+        )
+        tell(log.problem, raw, "horizontal", "thickness_mm", expected)
 
 
 def _refuse_given(given, keys, raw, log, section="horizontal"):
@@ -305,9 +334,9 @@ def _check_radii(given, end, form, diameter, raw, log):
         tell(log.problem, raw, "horizontal", f"{end}_knuckle_radius_m", expected)
 
 
-def _check_dip(given, raw, log):
+def _check_dip(given, height_m, raw, log):
     dip, length, tilt = (given[key] for key in ("dip_from_a_m", "length_m", "tilt_mm_per_m"))
-    height = given["height_m"] or given["diameter_m"]
+    height = given["height_m"] or given["diameter_m"] or height_m
     if None not in (dip, length):
         is_plumb = given["dip_direction"] != "square" and None not in (tilt, height)
         at_top = dip + (tilt / 1000 * height if is_plumb else 0.0)

@@ -1,6 +1,6 @@
 """The tables and keys of strapping: circumferences by tape, what is in its way, gauges, tapes."""
 
-from tankcal.job.contract.kinds import VERTICAL
+from tankcal.job.contract.kinds import LYING, STRAPPED, VERTICAL
 from tankcal.job.contract.observations import USE
 from tankcal.job.fields import Field
 from tankcal.survey.strapping import KINDS
@@ -16,20 +16,28 @@ NEEDED = {  # of an obstruction, by its kind
 }
 
 
-def _name(name, note, required=False):
-    return Field(name, "name", note, required=required)
+def _name(name, note, required=False, kinds=()):
+    return Field(name, "name", note, required=required, kinds=kinds)
 
 
-def _number(name, note, low, high, required=False, above_low=False):
-    return Field(name, "number", note, required=required, low=low, high=high, above_low=above_low)
+def _number(name, note, low, high, required=False, above_low=False, kinds=()):
+    bounds = {"low": low, "high": high, "above_low": above_low}
+    return Field(name, "number", note, required=required, kinds=kinds, **bounds)
 
 
-_COURSE = _name("course", "course of courses.csv", required=True)
+_COURSE = _name("course", "course of courses.csv", required=True, kinds=VERTICAL)
+_RING = _name("ring", "lying tank, in place of course: ring of rings.csv", True, LYING)
 CIRCUMFERENCES = (
     _name("circumference", "its name; rows of the same name are repeated readings", required=True),
     _COURSE,
+    _RING,
     _number(
-        "level_m", "height of the tape above the table's zero, metres", -100, 100, required=True
+        "level_m", "height of the tape above the table's zero, metres", -100, 100, required=True,
+        kinds=VERTICAL,
+    ),
+    _number(
+        "from_a_m", "lying tank, in place of level_m: place of the tape along the axis from the"
+        " start of the cylinder at A, metres", 0, 200, required=True, kinds=LYING,
     ),
     _number(
         "reading_m",
@@ -89,6 +97,7 @@ OBSTRUCTIONS = (
 )
 THICKNESS = (
     _COURSE,
+    _RING,
     _number(
         "thickness_mm", "reading of the gauge, millimetres; their mean replaces that of"
         " courses.csv", 0, 100, required=True, above_low=True,
@@ -107,6 +116,7 @@ TAPE_CHECKS = (
             0, 100),
     Field("when", "choice", "before or after the work", choices=("before", "after")),
 )  # fmt: skip
+IN_PLACE = {"course": "ring", "level_m": "from_a_m"}  # columns of lying tanks
 COLUMNS = {
     "circumferences": CIRCUMFERENCES,
     "obstructions": OBSTRUCTIONS,
@@ -120,7 +130,7 @@ KEYS = {
             "number",
             "standard deviation of the radius round the wall, millimetres: how far from a circle a"
             " strapped shell is; needed with circumferences",
-            kinds=VERTICAL,
+            kinds=STRAPPED,
             low=0,
             high=300,
         ),
@@ -130,7 +140,7 @@ KEYS = {
             "wave_mm",
             "number",
             "how far the tape was at most above or below its level, millimetres; blank: not in U",
-            kinds=VERTICAL,
+            kinds=STRAPPED,
             low=0,
             high=1000,
         ),
@@ -138,7 +148,7 @@ KEYS = {
             "helix_mm",
             "number",
             "how far its ends stood apart in height at most, millimetres; blank: not in U",
-            kinds=VERTICAL,
+            kinds=STRAPPED,
             low=0,
             high=1000,
         ),

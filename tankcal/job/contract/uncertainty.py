@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from tankcal.gum.distributions import FAMILIES, expanded, within
 from tankcal.job.checking import refuse_repeated
-from tankcal.job.contract.kinds import KINDS, VERTICAL, WITH_POINTS
+from tankcal.job.contract.kinds import KINDS, STRAPPED, VERTICAL, WITH_POINTS
 from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.fields import Field
 from tankcal.messages import message
@@ -53,8 +53,8 @@ def _of_shell(unit, per_si, largest, note, **more):
     return Declarable(unit, per_si, largest, note, VERTICAL, **more)
 
 
-def _of_lying(unit, per_si, largest, note):
-    return Declarable(unit, per_si, largest, note, ("horizontal",))
+def _of_lying(unit, per_si, largest, note, **more):
+    return Declarable(unit, per_si, largest, note, ("horizontal",), **more)
 
 
 INPUTS = {
@@ -73,8 +73,8 @@ INPUTS = {
     "plate_thickness": Declarable(
         "mm", 1e3, 10, "plate thickness, the same error everywhere", WITH_POINTS, default=0.2
     ),
-    "paint": _of_shell(
-        "mm", 1e3, 5, "paint thickness, the same error in all courses", default=0.05
+    "paint": Declarable(
+        "mm", 1e3, 5, "paint thickness, the same error in all courses", STRAPPED, default=0.05
     ),
     "shell_temperature": Declarable("K", 1, 50, "shell temperature during the survey", default=2.0),
     "expansion": Declarable("1/K", 1, 1e-4, "coefficient of thermal expansion", default=1e-6),
@@ -112,6 +112,16 @@ INPUTS = {
         ("vertical", "horizontal"),
     ),
     "dip_position": _of_lying("mm", 1e3, 2000, "place of the dip point along the axis"),
+    "ring_lengths": _of_lying(
+        "mm", 1e3, 100, "length of each ring, independent of the others", correlates=False
+    ),
+    "ring_axes": _of_lying(
+        "mm",
+        1e3,
+        50,
+        "how far the axis of each ring stands above the common one, independent of the others",
+        correlates=False,
+    ),
     "surface": Declarable("mm", 1e3, 200, "offset of the mesh's surface from the wall", ("mesh",)),
     "interpolation": Declarable(
         "m3", 1, 100, "straight line between two rows, of each reading", correlates=False

@@ -11,6 +11,7 @@ from tankcal.job.model.parts import (
     End,
     Horizontal,
     Mesh,
+    Ring,
     Roof,
     Sphere,
 )
@@ -50,6 +51,7 @@ __all__ = [
     "Metering",
     "Points",
     "Radii",
+    "Ring",
     "Roof",
     "Sphere",
     "StatedVolume",
@@ -83,6 +85,8 @@ class Job:
         As handed in; None where sizes or a survey stand in their place.
     bottom : Bottom
         Of a vertical tank.
+    rings : tuple of Ring
+        Of a lying cylinder that a tape was put round, from end A to end B; of others ().
     deadwood : tuple of Deadwood
         In the order of the file.
     roof : Roof or None
@@ -160,3 +164,4 @@ class Job:
     liquid: Metering | None = None
     radii: Radii | None = None
     change: Change | None = None
+    rings: tuple[Ring, ...] = ()

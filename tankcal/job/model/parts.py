@@ -36,6 +36,30 @@ class Course:
 
 
 @dataclass(frozen=True)
+class Ring:
+    """One ring of plates of a lying cylinder, from end A to end B.
+
+    Attributes
+    ----------
+    name : str
+    length_m : float
+        Along the axis, m.
+    thickness_m : float
+        Of its plates, m.
+    paint_m : float
+        Thickness of their paint, m.
+    lap : str or None
+        "inner" or "outer" of lap-jointed rings; None: not known.
+    """
+
+    name: str
+    length_m: float
+    thickness_m: float
+    paint_m: float = 0.0
+    lap: str | None = None
+
+
+@dataclass(frozen=True)
 class Bottom:
     """The bottom of a vertical tank, below or above the bottom of its first course.
 
@@ -146,7 +170,7 @@ class Horizontal:
     length_m : float
         Of the cylinder, without the ends; the same inside and outside.
     width_m, height_m : float or None
-        Of its cross-section, equal when round; None: they come from the points.
+        Of its cross-section, equal when round; None: they come from the points or the straps.
     tilt : float or None
         Rise of end B over end A per metre of axis, tan of the angle; None: from the points.
     roll_rad : float
@@ -156,7 +180,8 @@ class Horizontal:
     dip_direction : str
         Dips are read "plumb", or "square" to the axis.
     thickness_m : float
-        Plate and paint, to be subtracted from what was measured outside.
+        Plate and paint, to be subtracted from what was measured outside; of strapped rings those of
+        the ends.
     azimuth_rad : float or None
         Direction from A to B, clockwise from +y; None: no points.
     """

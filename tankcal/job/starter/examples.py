@@ -98,6 +98,10 @@ EXAMPLES_OF_TABLES = {
         {"course": "1", "height_m": 1.9, "thickness_mm": 8.0, "paint_mm": 0.3},
         {"course": "2", "height_m": 1.9, "thickness_mm": 6.3, "paint_mm": 0.3},
     ],
+    "rings": [
+        {"ring": "1", "length_m": 1.9, "thickness_mm": 8.0, "paint_mm": 0.3, "lap": "outer"},
+        {"ring": "2", "length_m": 1.9, "thickness_mm": 8.0, "paint_mm": 0.3, "lap": "inner"},
+    ],
     "welds": [{"course": "1", "azimuth_deg": 34.5}],
     "bottom": [{"x_m": 1.5, "y_m": -2.0, "z_m": 0.048, "s_mm": 2.0}],
     "deadwood": [
@@ -114,14 +118,18 @@ EXAMPLES_OF_TABLES = {
         {
             "circumference": "1-20",
             "course": "1",
+            "ring": "1",
             "level_m": 0.38,
+            "from_a_m": 0.38,
             "reading_m": 40.8925,
             "s_mm": 0.5,
         },
         {
             "circumference": "1-80",
             "course": "1",
+            "ring": "1",
             "level_m": 1.52,
+            "from_a_m": 1.52,
             "reading_m": 40.8931,
             "s_mm": 0.5,
         },
@@ -142,7 +150,9 @@ EXAMPLES_OF_TABLES = {
             "s_mm": 0.5,
         },
     ],
-    "thickness": [{"course": "1", "thickness_mm": 7.92, "azimuth_deg": 90, "paint_mm": 0.3}],
+    "thickness": [
+        {"course": "1", "ring": "1", "thickness_mm": 7.92, "azimuth_deg": 90, "paint_mm": 0.3}
+    ],
     "tape_checks": [
         {"level": "1", "master_m": 40.8930, "working_m": 40.8921, "s_mm": 0.3, "when": "before"}
     ],

@@ -17,6 +17,7 @@ from tankcal.job.fields import Field
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
 STRAPPED = ("strapping", "reference-line")  # surveys that are not adjusted as points
+OF_RINGS = "strapping"  # of them that of a lying tank, too
 METERED = "liquid"  # a survey of every kind of tank
 DECLARED = "radii"  # no survey, but what a former table, a record or somebody says
 OF_SHELLS = (*STRAPPED, "wall-hits", "tangents", DECLARED)  # surveys of upright tanks alone
@@ -42,7 +43,9 @@ class Form:
         if self.survey is not None:
             _refuse_others(self.survey, SURVEYS)
             has_none = "points" not in TABLES_OF_KIND[self.kind] and self.survey != METERED
-            if has_none or (self.survey in OF_SHELLS and self.kind != "vertical"):
+            is_ringed = self.survey == OF_RINGS and self.kind == "horizontal"
+            is_shell = self.kind == "vertical" or is_ringed
+            if has_none or (self.survey in OF_SHELLS and not is_shell):
                 raise ValueError(f"a tank of kind {self.kind} has no survey; expected another kind")
 
     @property
@@ -51,6 +54,8 @@ class Form:
         of_tank = TABLES_OF_KIND[self.kind]
         if self.survey is None:
             return of_tank
+        if self.survey == OF_RINGS and self.kind == "horizontal":
+            of_tank = ("rings", *of_tank)
         return (*SURVEYS[self.survey], *(table for table in of_tank if table != "points"))
 
     @property

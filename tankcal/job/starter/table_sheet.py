@@ -2,7 +2,7 @@
 
 from xlsxwriter.utility import xl_rowcol_to_cell
 
-from tankcal.job.contract import COLUMNS
+from tankcal.job.contract import columns_of
 from tankcal.job.starter.examples import EXAMPLES_OF_TABLES
 from tankcal.job.starter.look import LINE_PT, YELLOW, lines_of, opened, print_on_a4, type_of_cell
 from tankcal.job.starter.texts import is_number, parted
@@ -18,7 +18,7 @@ _PORTRAIT_WIDTH, _LANDSCAPE_WIDTH = 95, 180
 
 def write_table(sheet, table, form, texts, look):
     """Write the empty sheet of a table of a Form."""
-    fields = COLUMNS[table]
+    fields = columns_of(table, form.kind)
     examples = EXAMPLES_OF_TABLES[table]
     first_row = FIRST_EXAMPLE + len(examples)
     widths = _widths(fields, [texts.note("columns", table, field) for field in fields])

@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
-from tankcal.job.contract import COLUMNS
+from tankcal.job.contract import columns_of
 from tankcal.job.starter.book import write_book
 from tankcal.job.starter.form import Form
 from tankcal.job.starter.texts import is_number, texts_in
@@ -126,12 +126,13 @@ def csv_text(table, form):
     """A CSV file of a Form: comments, and the row of headings."""
     texts = texts_in(form.language)
     lines = [f"# {texts.note('tables', table)}; {texts.of('files', 'comments')}"]
-    for field in COLUMNS[table]:
+    fields = columns_of(table, form.kind)
+    for field in fields:
         blank = "" if field.required else f" [{texts.of('files', 'may_be_blank')}]"
         lines.append(f"# {field.name}: {texts.note('columns', table, field)}{blank}")
     if table == "uncertainty":
         lines += [_input(texts, name, one) for name, one in form.inputs.items()]
-    names = [field.name for field in COLUMNS[table]]
+    names = [field.name for field in fields]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([row.get(name, "") for name in names] for row in form.rows(table))

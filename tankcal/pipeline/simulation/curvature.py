@@ -44,6 +44,11 @@ def vary_input(job, name, change):
         key = {"plate_thickness": "thickness_m", "paint": "paint_m"}[name]
         courses = (replace(one, **{key: getattr(one, key) + change}) for one in job.courses)
         return replace(job, courses=tuple(courses))
+    if name in ("plate_thickness", "paint") and job.rings:
+        key = {"plate_thickness": "thickness_m", "paint": "paint_m"}[name]
+        rings = tuple(replace(one, **{key: getattr(one, key) + change}) for one in job.rings)
+        moved = replace(job, rings=rings)
+        return moved if name == "paint" else _of_solid(moved, name, change)
     if job.points is not None:
         return None if name != "plate_thickness" else _of_solid(job, name, change)
     return _of_solid(job, name, change)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from tankcal.tank.fittings import deadwood
+from tankcal.tank.heads import End
 
 LEARNED, HALF_LEARNED = 0.1, 0.5  # share of a variance's logarithm that is assumed, at most
 
@@ -24,8 +25,8 @@ def estimates_of(job):
     given = {
         **dict.fromkeys(("scale", "datum", "offset", "bottom", "barrel", "taper", "deadwood"), 0.0),
         "surface": 0.0,
-        "plate_thickness": _only([1000 * course.thickness_m for course in job.courses]),
-        "paint": _only([1000 * course.paint_m for course in job.courses]),
+        "plate_thickness": _only([1000 * part.thickness_m for part in job.courses or job.rings]),
+        "paint": _only([1000 * part.paint_m for part in job.courses or job.rings]),
         "shell_temperature": survey.shell_temperature_c,
         "expansion": material.expansion_per_k,
         "youngs_modulus": material.e_pa / 1e9,
@@ -43,7 +44,7 @@ def _of_solid(job):
     lying, solid = job.horizontal, job.horizontal or job.sphere
     if solid is None:
         return {}
-    plate = {"plate_thickness": 1000 * solid.thickness_m}
+    plate = {} if job.rings else {"plate_thickness": 1000 * solid.thickness_m}
     if lying is None:
         return {**plate, "diameter": _thousand(solid.diameter_m)}
     round_m = lying.width_m if lying.width_m == lying.height_m else None
@@ -108,3 +109,9 @@ def thermal_scale(job, switches):
 
 def is_warmed(job, switches):
     return switches.temperature and job.survey.shell_temperature_c is not None
+
+
+def inside_end(end, plate_m, scale):
+    """The inside of an end; the depth of a torispherical one follows from its radii."""
+    lengths = (end.depth_m, end.dish_radius_m, end.knuckle_radius_m)
+    return End(end.kind, *(scale * (length - plate_m) if length else length for length in lengths))

@@ -4,14 +4,36 @@ from dataclasses import replace
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.pipeline.tanks.common import deadwood_part, estimates_of, is_warmed, thermal_scale
+from tankcal.pipeline.tanks.common import (
+    deadwood_part,
+    estimates_of,
+    inside_end,
+    is_warmed,
+    thermal_scale,
+)
+from tankcal.pipeline.tanks.rings import ringed_part
 from tankcal.tank.body import Body, SolidPart
-from tankcal.tank.heads import End
 from tankcal.tank.meshes import mesh_part
 from tankcal.tank.solids import LyingTank, Sphere
 
 
 def solid_body(job, survey, switches):
+    part = ringed_part(job, survey, switches) if job.rings else _part(job, survey, switches)
+    parts, zero = [part], solid_zero(job)
+    if switches.deadwood and job.deadwood:
+        parts.append(deadwood_part(job.deadwood, zero))
+    return Body(
+        tuple(parts),
+        job.inputs,
+        lowest_m=0.0,
+        highest_m=part.top_m,
+        correlations=job.correlations,
+        estimates=estimates_of(sized_job(job, survey)),
+    )
+
+
+def _part(job, survey, switches):
+    """`SolidPart` of a tank of declared sizes, of points, or of a mesh."""
     scale = thermal_scale(job, switches)
     job = sized_job(job, survey)
     given = job.horizontal or job.sphere
@@ -24,25 +46,13 @@ def solid_body(job, survey, switches):
         solid = _lying(job.horizontal, plate, scale)
     else:
         solid = _of_mesh(job, survey, scale)
-    part = SolidPart(
+    return SolidPart(
         solid,
         scale,
         job.material.expansion_per_k,
         warmed=is_warmed(job, switches),
         **(_of_scan(survey, scale) if job.points is not None else {}),
         unused=() if plate else ("plate_thickness",),
-    )
-    parts = [part]
-    zero = solid_zero(job)
-    if switches.deadwood and job.deadwood:
-        parts.append(deadwood_part(job.deadwood, zero))
-    return Body(
-        tuple(parts),
-        job.inputs,
-        lowest_m=0.0,
-        highest_m=part.top_m,
-        correlations=job.correlations,
-        estimates=estimates_of(job),
     )
 
 
@@ -116,16 +126,10 @@ def _lying(tank, plate_m, scale):
         width_m=scale * (tank.width_m - 2 * plate_m),
         height_m=scale * (tank.height_m - 2 * plate_m),
         length_m=scale * tank.length_m,
-        end_a=_end(tank.end_a, plate_m, scale),
-        end_b=_end(tank.end_b, plate_m, scale),
+        end_a=inside_end(tank.end_a, plate_m, scale),
+        end_b=inside_end(tank.end_b, plate_m, scale),
         tilt=tank.tilt,
         roll_rad=tank.roll_rad,
         dip_from_a_m=scale * tank.dip_from_a_m,
         dip_direction=tank.dip_direction,
     )
-
-
-def _end(end, plate_m, scale):
-    """The inside of an end; the depth of a torispherical one follows from its radii."""
-    lengths = (end.depth_m, end.dish_radius_m, end.knuckle_radius_m)
-    return End(end.kind, *(scale * (length - plate_m) if length else length for length in lengths))

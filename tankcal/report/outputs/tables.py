@@ -27,7 +27,7 @@ def write_tables(record, directory):
     """Write every table of the record that has rows, as CSV."""
     tables = {"points": (survey.POINTS, None), "sections": (tank.SECTIONS, None)}
     if record.get("strapping"):
-        tables["strapping"] = strapping.STRAPS, None
+        tables["strapping"] = strapping.straps_of(record), None
     if record.get("lines"):
         tables["offsets"] = lines.OFFSETS, None
     if record.get("liquid"):

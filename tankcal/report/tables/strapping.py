@@ -78,3 +78,22 @@ STRAPPED_COURSES = Table(
     ),
     rows=lambda record: record["strapping"]["courses"],
 )  # fmt: skip
+
+
+def straps_of(record):
+    """`STRAPS` with the headings of the tank: of a lying one rings, and places from A."""
+    return _headed(STRAPS, record)
+
+
+def strapped_courses_of(record):
+    """`STRAPPED_COURSES` with the headings of the tank."""
+    return _headed(STRAPPED_COURSES, record)
+
+
+def _headed(table, record):
+    if record["job"]["tank"]["kind"] != "horizontal":
+        return table
+    return table.but(
+        course={"heading": "ring", "sheet": "ring", "csv": "ring"},
+        level_m={"heading": "from_a_m", "sheet": "strap_from_a_m", "csv": "from_a_m"},
+    )

@@ -25,9 +25,9 @@ def strapping_sheet(book, record):
     """Every reading of the tape with its corrections, the tapes, and what they make of courses."""
     sheet = book.sheet("strapping", book.word("texts.strapping_subtitle"), landscape=True)
     tables = [
-        (book.word("headings.straps"), "straps", columns_of(book, strapping.STRAPS)),
+        (book.word("headings.straps"), "straps", columns_of(book, strapping.straps_of(record))),
         (book.word("headings.strapped_courses"), "strapped_courses",
-         columns_of(book, strapping.STRAPPED_COURSES)),
+         columns_of(book, strapping.strapped_courses_of(record))),
         (book.word("headings.tapes"), "tapes", columns_of(book, strapping.TAPES)),
     ]  # fmt: skip
     write_tables(book, sheet, _HEAD_ROW, tables)

@@ -1,0 +1,1 @@
+"""Inspection by the same survey: plumbness, roundness, peaking, settlement, each with its U."""

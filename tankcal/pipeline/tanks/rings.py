@@ -1,0 +1,40 @@
+"""A lying cylinder of strapped rings: their inside radii, and what is uncertain of them."""
+
+from tankcal.pipeline.tanks.common import inside_end, is_warmed, thermal_scale
+from tankcal.tank.body import SolidPart
+from tankcal.tank.rings import RingedTank
+
+SURVEYED = ("ring_radii", "dip_radius", "ring_waves")
+
+
+def ringed_part(job, wall, switches):
+    """`SolidPart` of a `ringed_wall.RingedWall`."""
+    scale, lying = thermal_scale(job, switches), job.horizontal
+    ends_m = lying.thickness_m * switches.plate
+    insets = [switches.plate * one.thickness_m + switches.paint * one.paint_m for one in job.rings]
+    radii = wall.radius_m - insets
+    tank = RingedTank(
+        tuple(float(scale * radius) for radius in radii),
+        tuple(scale * one.length_m for one in job.rings),
+        end_a=inside_end(lying.end_a, ends_m, scale),
+        end_b=inside_end(lying.end_b, ends_m, scale),
+        tilt=lying.tilt,
+        dip_from_a_m=scale * lying.dip_from_a_m,
+        dip_direction=lying.dip_direction,
+    )
+    features = wall.features_at(lying.dip_from_a_m)
+    warmed = is_warmed(job, switches)
+    bears = {
+        "plate_thickness": switches.plate and any(one.thickness_m for one in job.rings),
+        "paint": switches.paint and any(one.paint_m for one in job.rings),
+    }
+    return SolidPart(
+        tank,
+        scale,
+        job.material.expansion_per_k,
+        warmed=warmed,
+        surveyed=SURVEYED,
+        factors=tuple(one.mapped(lambda columns: scale * columns) for one in features.factors(job)),
+        unused=tuple(name for name, does in bears.items() if not does),
+        read_with=features.read_with() if warmed else {},
+    )

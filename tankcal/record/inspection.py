@@ -1,0 +1,189 @@
+"""An inspection of a tank, as it is saved: inspection.json.
+
+Every figure has its expanded uncertainty, every limit its source. What is said in words (checks,
+verdicts, remarks) stands here as codes with their numbers; the sentences are the templates'.
+"""
+
+import tankcal
+from tankcal.record.plain_data import to_plain
+from tankcal.record.saved_formats import SavedFormat
+from tankcal.record.schema import Finite, Saved, key
+from tankcal.record.texts import WarningRecord
+
+INSPECTION = SavedFormat("tankcal-inspection", 1, "inspection.json")  # so far one version
+
+CHECKS = (  # in the order of the papers
+    "plumbness_axis", "plumbness_generatrix", "plumbness_course", "roundness_low",
+    "roundness_high", "peaking", "banding", "settlement_cosine", "settlement_all",
+    "settlement_subset", "settlement_curvature", "settlement_de_beer", "edge_settlement",
+    "bottom_bulge",
+)  # fmt: skip
+VERDICTS = ("passed", "guard_band", "failed", "not_determined")
+
+
+class InspectedTank(Saved):
+    """What was inspected."""
+
+    id: str = key("of the tank")
+    name: str = key("of the job")
+    source: str = key('"job" or "record"')
+    file: str = key("name of the job or of the record")
+    sha256: str | None = key("of the record; null: a job")
+    survey_date: str | None = key("null: not known")
+    survey_side: str | None = key('"inside" or "outside"; null: no wall was surveyed')
+    methods: list[str] = key("what observed the wall: points, straps, lines, hits, tangents, scan")
+    nominal_diameter_m: float | None = key("null: not given")
+    nominal_source: str = key('"drawing": as given; "mean": that of the wall as surveyed; "none"')
+    height_m: float | None = key("of the shell; null: not known")
+    state: str = key('"as_found": loaded as it was surveyed; "unloaded": head taken off')
+
+
+class InspectionRule(Saved):
+    """What the inspection was judged by."""
+
+    name: str = key("of the rule")
+    file: str = key("name of its file")
+    source: str = key("where its values were read")
+    verified: bool = key("whether every value was read in the text itself")
+    remark: str = key("what is to stand beside it")
+
+
+class InspectionLimit(Saved):
+    """A limit of the rule, for this tank."""
+
+    name: str = key("of the limit in its rule file")
+    value: Finite = key("in the unit of the check")
+    clause: str = key("where it stands")
+    verified: bool = key("whether it was read there")
+
+
+class InspectionCheck(Saved):
+    """One figure against one limit."""
+
+    code: str = key("such as plumbness_generatrix, see docs/inspection.md")
+    unit: str = key('"mm", "mm/m", "1/m" or "" (a ratio)')
+    value: float | None = key("the largest, with its sign; null: not determined")
+    U: float | None = key("expanded; null: not known")
+    k: float | None = key("coverage factor of U")
+    course: int | None = key("from the bottom, 1 first; null: of no single course")
+    height_m: float | None = key("above the bottom of the shell; null: of no single height")
+    azimuth_deg: float | None = key("null: of no single azimuth")
+    epoch: str | None = key("of a settlement; null: of the survey")
+    used: int = key("places that the largest was taken from")
+    limit: InspectionLimit | None = key("null: the rule has none")
+    probability: float | None = key("of conformity; null: no limit, or not determined")
+    verdict: str = key('"passed", "guard_band", "failed" or "not_determined"')
+    remark: str | None = key("code of what is to be read beside it; null: nothing")
+    remark_values: dict = key("numbers and texts of the remark")
+
+
+class Generatrices(Saved):
+    """Departures of the wall from the plumb, along generatrices; outwards positive."""
+
+    azimuth_deg: list[Finite] = key("of each generatrix")
+    height_m: list[Finite] = key("above the bottom of the shell")
+    course: list[int] = key("of each height")
+    departure_mm: list[list[Finite]] = key("heights x azimuths, from the lowest height")
+    U_mm: list[list[Finite]] = key("expanded, of each")
+
+
+class InspectedLevel(Saved):
+    """A section of the wall."""
+
+    height_m: Finite = key("above the bottom of the shell")
+    course: int = key("from the bottom, 1 first")
+    mean_radius_m: Finite = key("inside, of the section about its own centre")
+    centre_x_m: Finite = key("of the section, in the frame of the survey")
+    centre_y_m: Finite = key("of the section, in the frame of the survey")
+    azimuth_deg: list[Finite] = key("of each place")
+    departure_mm: list[Finite] = key("radius from its own centre less the nominal one")
+    U_mm: list[Finite] = key("expanded, of each")
+
+
+class WeldGap(Saved):
+    """The gap of a board at one weld."""
+
+    kind: str = key('"peaking" (vertical weld) or "banding" (horizontal)')
+    course: int = key("of a vertical weld; of a horizontal one that below it")
+    height_m: Finite = key("of the middle of the board, above the bottom of the shell")
+    azimuth_deg: Finite = key("of the middle of the board")
+    gap_mm: float | None = key("largest within reach of the weld, outwards positive")
+    U_mm: float | None = key("expanded; null: not determined")
+    along_mm: list[float] = key("places on the board of the profile, 0 at the weld")
+    profile_mm: list[float] = key("gap at each")
+
+
+class SettlementPoint(Saved):
+    """A point of the bottom's edge in one epoch, or in the difference of two."""
+
+    point: str = key("name")
+    azimuth_deg: Finite = key("clockwise from +y")
+    z_mm: Finite = key("elevation, or its change")
+    s_mm: float | None = key("standard deviation; null: not given")
+    fitted_mm: Finite = key("a + p cos t + q sin t")
+    U_i_mm: Finite = key("out of the tilted plane: z less fitted")
+    S_i_mm: float | None = key("less the mean of its neighbours; null: too few points")
+    U_S_mm: float | None = key("expanded uncertainty of S_i; null: no sd is known")
+    in_subset: bool = key("whether the spaced subset takes it")
+
+
+class Settlement(Saved):
+    """Settlement of one epoch, or between two."""
+
+    epoch: str = key("name")
+    since: str | None = key("the earlier epoch; null: deviations include how it was built")
+    a_mm: Finite = key("mean of the plane")
+    p_mm: Finite = key("cosine term")
+    q_mm: Finite = key("sine term")
+    b_mm: Finite = key("hypot(p, q)")
+    U_b_mm: float | None = key("expanded")
+    highest_azimuth_deg: Finite = key("of the plane")
+    tilt_mm_per_m: Finite = key("b over the radius")
+    R2: Finite = key("share of the scatter that the plane explains")
+    sd_known: bool = key("whether standard deviations were given; else from the repeats, or none")
+    arc_m: Finite = key("between neighbours, mean")
+    limit_mm: float | None = key("of S_i with all points; null: yield or height not given")
+    limit_half_mm: float | None = key("the same with every second point")
+    subset_arc_m: float | None = key("between neighbours of the subset")
+    subset_limit_mm: float | None = key("of S_i of the subset")
+    harmonics: int | None = key("highest that was fitted for the curvature")
+    curvature_per_m: float | None = key("largest |d2U/ds2| of the harmonics")
+    U_curvature_per_m: float | None = key("expanded")
+    curvature_limit_per_m: float | None = key("11 Y / (E H)")
+    points: list[SettlementPoint] = key("by azimuth")
+
+
+class EdgeProfile(Saved):
+    """Edge settlement along one radial line of the bottom."""
+
+    azimuth_deg: Finite = key("clockwise from +y")
+    radius_m: list[Finite] = key("of each reading")
+    z_mm: list[Finite] = key("of each reading")
+    break_radius_m: float | None = key("where the bottom bends down; null: not found")
+    width_m: float | None = key("from there to the shell")
+    drop_mm: float | None = key("B, over that width; positive: the edge is lower")
+    U_mm: float | None = key("expanded")
+    limit_mm: float | None = key("null: the rule has none")
+
+
+class InspectionFile(Saved, kw_only=True):
+    """What the survey says of the state of a tank, judged by a rule."""
+
+    format: str = key("see Versions", default=INSPECTION.format)
+    tankcal: str = key("version of tankcal", default=tankcal.__version__)
+    notice: str = key("that stands on every page, such as EXAMPLE")
+    tank: InspectedTank = key("what was inspected")
+    rule: InspectionRule | None = key("null: figures without limits")
+    as_built: bool = key("whether an earlier epoch takes out how the tank was built")
+    checks: list[InspectionCheck] = key("in the order of docs/inspection.md")
+    generatrices: Generatrices | None = key("null: the wall was not surveyed")
+    levels: list[InspectedLevel] = key("from the bottom up; none: no wall")
+    gaps: list[WeldGap] = key("of every weld; none: no weld is known, or no cloud")
+    settlements: list[Settlement] = key("each epoch, then differences; none: not levelled")
+    edges: list[EdgeProfile] = key("none: not levelled")
+    warnings: list[WarningRecord] = key("what should be read")
+
+
+def plain_of_inspection(inspection):
+    """An `InspectionFile` as plain data."""
+    return to_plain(inspection)

@@ -1,0 +1,193 @@
+"""What lying tanks have in common: pieces along an axis, and a liquid whose surface cuts them.
+
+Volumes and free surfaces of `heads`' arcs, each at its place along the axis s, below a surface at
+
+    c(s) = c_p - tilt (s - p),   c_p = -r + d stretch,   d the dip, r the radius at its zero p,
+
+above the axis. Lengths are those of a round tank; one that is not round is squeezed into it.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tankcal.errors import HeightError, SolutionError
+from tankcal.messages import message
+from tankcal.tank.heads import Cut, EllipseArc, Line, depth_of, integrate, meridian
+from tankcal.tank.parts import Part
+
+ROUNDING = 1e-9  # of the highest dip: a dip so little outside is the top or the bottom itself
+
+
+@dataclass(frozen=True)
+class Piece:
+    """An arc of the meridian at its place along the axis, s = origin + way x.
+
+    Attributes
+    ----------
+    arc : Line or EllipseArc
+    origin_m : float
+    way, sign : int
+        Direction of x along the axis; -1 for room that an end takes from the tank.
+    end : str
+        "a" or "b"; "" of the cylinder.
+    ring : int
+        Of the cylinder, from A on; of an end that on which it sits.
+    """
+
+    arc: Line | EllipseArc
+    origin_m: float
+    way: int
+    sign: int
+    end: str
+    ring: int = 0
+
+
+class LyingSolid(Part):
+    """A lying tank as the sum of `Piece`s.
+
+    A subclass has `tilt`, `dip_from_a_m`, `dip_direction`, `top_m`, `_pieces`, and `_radius_m`, the
+    radius at the zero of its dips.
+    """
+
+    _squeeze = 1.0  # heights of the round tank to heights of this one
+    _has_twins = False  # whether both ends hold the same at any dip
+
+    @cached_property
+    def capacity_m3(self):
+        """Volume of the full tank."""
+        full = np.array([2 * max(piece.arc.at(piece.arc.start)[1] for piece in self._pieces)])
+        whole = (piece.sign * integrate(piece.arc, full, 0.0, [Cut.segment])[0, 0]
+                 for piece in self._pieces)  # fmt: skip
+        return float(sum(whole))
+
+    def volume_m3(self, levels_m):
+        """(rows,) volume below each dip."""
+        return self._sum(levels_m, Cut.segment)
+
+    def area_m2(self, levels_m):
+        """(rows,) derivative of the volume by the dip; the free surface, when the dip is plumb."""
+        return self._squeeze * self._stretch * self._sum(levels_m, Cut.chord)
+
+    def _sum(self, levels_m, integrand):
+        """(rows,) integral over the whole tank; equal ends of a level one are integrated once."""
+        pieces, twins = self._pieces, self._has_twins
+        if twins:
+            pieces = [piece for piece in pieces if piece.end != "b"]
+        return sum(
+            (2 if twins and piece.end == "a" else 1)
+            * self._integrals(piece, levels_m, [integrand])[0]
+            for piece in pieces
+        )
+
+    def _integrals(self, piece, levels_m, integrands):
+        """(integrands, rows) over one piece, of the round tank."""
+        level = self._liquid_m(levels_m, piece.origin_m)
+        slope = piece.way * self._squeeze * self.tilt
+        return piece.sign * integrate(piece.arc, level, slope, integrands)
+
+    def _moment(self, piece, surface, surface_moment):
+        """Moment of a piece's free surface about the place of the dip."""
+        return (piece.origin_m - self.dip_from_a_m) * surface + piece.way * surface_moment
+
+    def _section_m2(self, levels_m, s, ring=0):
+        """(rows,) wet part of the section of a ring of the cylinder at s."""
+        arc = self._pieces[ring].arc
+        return Cut(arc, s, s, arc.radius_m, self._liquid_m(levels_m, s)).segment()
+
+    def _liquid_m(self, levels_m, s):
+        """(rows,) height of the liquid above the axis at s, in the round tank of equal area."""
+        levels = levels_inside(levels_m, self._highest_m)
+        above_dip_zero = self._stretch * levels - self.tilt * (s - self.dip_from_a_m)
+        return self._squeeze * above_dip_zero - self._radius_m
+
+    @property
+    def _highest_m(self):
+        """The highest dip that is answered."""
+        return self.top_m
+
+    @property
+    def _stretch(self):
+        """Heights square to the axis to dips."""
+        return np.hypot(1.0, self.tilt) if self.dip_direction == "plumb" else 1.0
+
+
+def pieces_of_ends(ends, length_m, last_ring=0):
+    """`Piece`s of the ends.
+
+    ends  (End, radius of the cylinder there) of A and of B
+    """
+    places = ("a", 0.0, -1, 0), ("b", length_m, 1, last_ring)
+    for (end, radius), (name, origin, out, ring) in zip(ends, places, strict=True):
+        sign = -1 if end.inward else 1
+        for arc in meridian(end, radius):
+            yield Piece(arc, origin, sign * out, sign, name, ring)
+
+
+def refuse_meeting_ends(ends, length_m):
+    """SolutionError for ends that bulge inwards and meet; arguments as of `pieces_of_ends`."""
+    depths = [(depth_of(*one), one[0]) for one in ends]
+    inward = sum(depth for depth, end in depths if end.inward)
+    if inward > length_m:
+        raise SolutionError(
+            message(
+                "ends_meet",
+                "ends that bulge {inward_m:g} m inwards meet in a cylinder of {length_m:g} m",
+                inward_m=inward,
+                length_m=length_m,
+            )
+        )
+
+
+def check_directions(dip_direction, tilt, roll_rad=0.0):
+    """SolutionError for a direction of the dip that is none, and for angles that are none."""
+    if dip_direction not in ("plumb", "square"):
+        raise SolutionError(f"dip direction {dip_direction!r}: expected plumb or square")
+    if not np.isfinite(tilt) or not np.isfinite(roll_rad):
+        raise SolutionError(f"tilt {tilt} and roll {roll_rad}: expected numbers")
+
+
+def check_dip(dip_from_a_m, dip_direction, shift_m, length_m):
+    """SolutionError for a dip that does not stand in the cylinder.
+
+    shift_m  how much farther from A a plumb dip is at the top
+    """
+    low, high = dip_from_a_m, dip_from_a_m
+    if dip_direction == "plumb":
+        high += shift_m
+    slack = ROUNDING * length_m
+    if min(low, high) < -slack or max(low, high) > length_m + slack:
+        raise SolutionError(
+            message(
+                "dip_off_cylinder",
+                "the dip touches the bottom {low_m:g} m and leaves the top {high_m:g} m from "
+                "the start of the cylinder: expected both between 0 and {length_m:g} m",
+                low_m=low,
+                high_m=high,
+                length_m=length_m,
+            )
+        )
+
+
+def levels_inside(levels_m, top_m):
+    """The levels as an array; HeightError for one outside."""
+    levels = np.asarray(levels_m, dtype=float)
+    slack = ROUNDING * top_m
+    outside = ~((levels >= -slack) & (levels <= top_m + slack))
+    if np.any(outside):
+        raise HeightError(
+            message(
+                "dip_outside_tank",
+                "dip {dip_m:g} m is outside the tank (0 to {top_m:g} m)",
+                dip_m=levels[outside][0],
+                top_m=top_m,
+            )
+        )
+    return levels
+
+
+def require_length(name, length_m):
+    """SolutionError for a length that is not above zero."""
+    if not 0 < length_m < np.inf:
+        raise SolutionError(f"{name} {length_m:g} m: expected a length above zero")
