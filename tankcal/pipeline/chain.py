@@ -27,6 +27,7 @@ from tankcal.pipeline.nominal_wall import NominalWall
 from tankcal.pipeline.radii_wall import RadiiWall
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.scan import Scan
+from tankcal.pipeline.ship import ShipTables, ship_tables
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
 from tankcal.pipeline.stadia_checks import check_bases
@@ -96,6 +97,8 @@ class Result:
         The wall of the drawing, of an upright tank that only liquid tells.
     radii : radii_wall.RadiiWall or None
         The wall of declared radii, with what was measured again in them.
+    ship : ship.ShipTables or None
+        Corrections of soundings for trim and list, of a tank of a ship.
     body : body.Body
         The tank as the sum of its parts, with all corrections that are on.
     zero_m : float
@@ -154,6 +157,7 @@ class Result:
     liquid: LiquidResult | None = None
     nominal: NominalWall | None = None
     radii: RadiiWall | None = None
+    ship: ShipTables | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -379,6 +383,10 @@ def _run(job, progress, part_progress, simulated, reading):
         simulation = simulate_table(job, survey, body, zero, table, pairs, progress=part_progress)
         intervals = simulation.intervals(table)
     liquid = measured and measured.result(made.levels_m)
+    ship = None
+    if job.ship is not None:
+        probability = table.probability
+        ship = ship_tables(job, survey, body, probability, progress=part_progress)
     return Result(
         job=job,
         wall=measured_wall if isinstance(measured_wall, Wall) else None,
@@ -410,6 +418,7 @@ def _run(job, progress, part_progress, simulated, reading):
         liquid=liquid,
         nominal=survey if isinstance(survey, NominalWall) else None,
         radii=radii,
+        ship=ship,
     )
 
 

@@ -12,6 +12,7 @@ from tankcal.job.model.parts import (
     Horizontal,
     Mesh,
     Roof,
+    Ship,
     Sphere,
 )
 from tankcal.job.model.radii import Change, Radii
@@ -51,6 +52,7 @@ __all__ = [
     "Points",
     "Radii",
     "Roof",
+    "Ship",
     "Sphere",
     "StatedVolume",
     "Survey",
@@ -89,6 +91,8 @@ class Job:
         None without a floating roof.
     horizontal, sphere, mesh
         None for the other kinds of tank.
+    ship : Ship or None
+        Of a mesh: trims, lists and the pipe of a tank that goes to sea.
     measurements : Measurements or None
         The survey that the points are to be adjusted from.
     inputs : tuple of DeclaredInput
@@ -146,6 +150,7 @@ class Job:
     horizontal: Horizontal | None = None
     sphere: Sphere | None = None
     mesh: Mesh | None = None
+    ship: Ship | None = None
     measurements: Measurements | None = None
     correlations: tuple[tuple[str, str, float], ...] = ()
     stated: tuple[StatedVolume, ...] = ()

@@ -262,10 +262,14 @@ class _Tree:
     def _store(self, nodes, some, foot, reach, amounts):
         at_middle = (self.middle[nodes] - foot[some]) / reach[some]
         step = self.half[nodes] / reach[some]
+        of_middle, of_step = [np.ones_like(step)], [np.ones_like(step)]
+        for _ in range(max(amounts)):  # products, for powers of arrays are slow
+            of_middle.append(of_middle[-1] * at_middle)
+            of_step.append(of_step[-1] * step)
         for power, amount in amounts.items():
             own = np.atleast_2d(amount)[:, some]
             for k in range(power + 1):
-                terms = own * (comb(power, k) * at_middle ** (power - k) * step**k)
+                terms = own * (comb(power, k) * of_middle[power - k] * of_step[k])
                 for column, term in enumerate(terms):
                     self.coefficients[k, column] += np.bincount(
                         nodes, weights=term, minlength=2 * self.leaves

@@ -2,7 +2,7 @@
 
 from tankcal.tank.ships.corrections import (
     CellCorrections,
-    corrections_of_cell,
+    corrections_of,
     soundings_of_volumes,
 )
 from tankcal.tank.ships.piped import Pipe, PipedMesh, in_ship_frame, piped_mesh
@@ -11,7 +11,7 @@ __all__ = [
     "CellCorrections",
     "Pipe",
     "PipedMesh",
-    "corrections_of_cell",
+    "corrections_of",
     "in_ship_frame",
     "piped_mesh",
     "soundings_of_volumes",

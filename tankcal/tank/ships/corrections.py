@@ -31,49 +31,69 @@ class CellCorrections:
     ----------
     volume_m3 : ndarray, shape (rows,)
         At each sounding; the capacity where the tank is full.
-    state : tuple of str
-        "" where the correction can be read; "full" where the tank is; "below" where the volume is
-        less than the table at even keel begins with.
+    state : ndarray of str, shape (rows,)
+        "" where the sounding has a correction; "full" where the tank is; "below" where the volume
+        is less than the table at even keel begins with.
     even_m : ndarray, shape (rows,)
         Soundings at even keel of the same volume; nan where there is none.
     dry_m3 : float
         Volume at which the pipe becomes dry.
     full_m : float
         Sounding at which the tank becomes full.
+    interpolated_m : float
+        Largest error of a correction that is interpolated half way between two soundings.
     """
 
     volume_m3: np.ndarray
-    state: tuple[str, ...]
+    state: np.ndarray
     even_m: np.ndarray
     dry_m3: float
     full_m: float
+    interpolated_m: float
 
 
-def corrections_of_cell(part, even, soundings_m):
-    """The `CellCorrections` of soundings.
+def corrections_of(parts, even, soundings_m):
+    """`CellCorrections` of each trim and list, their volumes inverted all at once.
 
     Parameters
     ----------
-    part : PipedMesh
-        At the trim and list.
+    parts : sequence of PipedMesh
+        One for each trim and list.
     even : PipedMesh
         At even keel.
     soundings_m : ndarray, shape (rows,)
-        From the pipe's lower end, 0 or above.
+        From the pipe's lower end, 0 first, ascending.
 
     Returns
     -------
-    CellCorrections
+    list of CellCorrections
     """
     soundings = np.asarray(soundings_m, dtype=float)
-    volume = part.volume_m3(np.minimum(soundings, part.top_m))
-    full = soundings >= part.top_m
-    below = ~full & (volume < even.dry_m3)
-    some = ~full & ~below
-    even_m = np.full(len(soundings), np.nan)
-    even_m[some] = soundings_of_volumes(even, volume[some])
+    middles = (soundings[:-1] + soundings[1:]) / 2
+    every = np.concatenate([soundings, middles])
+    volumes = np.array([one.volume_m3(np.minimum(every, one.top_m)) for one in parts])
+    full = every >= np.array([one.top_m for one in parts])[:, None]
+    below = ~full & (volumes < even.dry_m3)
+    even_m = np.full(volumes.shape, np.nan)
+    even_m[~full & ~below] = soundings_of_volumes(even, volumes[~full & ~below])
     state = np.where(full, FULL, np.where(below, BELOW, READABLE))
-    return CellCorrections(volume, tuple(state.tolist()), even_m, part.dry_m3, part.top_m)
+    rows = len(soundings)
+    return [
+        CellCorrections(
+            volumes[i, :rows],
+            state[i, :rows],
+            even_m[i, :rows],
+            float(volumes[i, 0]),
+            part.top_m,
+            _interpolated(even_m[i, :rows] - soundings, even_m[i, rows:] - middles),
+        )
+        for i, part in enumerate(parts)
+    ]
+
+
+def _interpolated(correction, exact):
+    between = (correction[:-1] + correction[1:]) / 2
+    return float(np.nanmax(np.abs(between - exact), initial=0.0))
 
 
 def soundings_of_volumes(part, volumes_m3):

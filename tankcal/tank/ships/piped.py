@@ -86,6 +86,8 @@ class PipedMesh(Part):
     contracted : float or None
         Lengths of this mesh over those that were measured, by a uniform contraction; None: none
         was given.
+    marks_m : float
+        Distance that the input "trim" is read over, the tangent times it.
     """
 
     pipe: Pipe
@@ -94,6 +96,7 @@ class PipedMesh(Part):
     sheared: MeshPart
     plan_m: np.ndarray
     contracted: float | None = None
+    marks_m: float = 1.0
 
     @property
     def rise(self):
@@ -129,14 +132,15 @@ class PipedMesh(Part):
         scale      of all coordinates, those of the pipe too, but not of the soundings
         surface    an outward offset of the surface along its normal, m: the wetted area
         datum      of the pipe's zero along the pipe, m
-        trim, list of the tangent, and of the angle in rad: A s u_x - moment of the surface by x
+        trim, list  draught aft less draught forward, m, and the angle, rad: by the tangents it is
+                   A s u_x - moment of the free surface by x, and so by y
         pipe_x, pipe_y  place of the whole pipe, m
         pipe_lean  (rows, 2) of the pipe about its lower end, m/m, fore and aft and athwart
         contraction  of the share that all lengths are contracted by, where one was given
         """
         soundings, heights = as_levels(levels_m), self._heights(levels_m)
-        volume, area = self.sheared.volume_m3(heights), self.sheared.area_m2(heights)
-        moment = self._moments_m3(heights)
+        volume = self.sheared.volume_m3(heights)
+        area, *moment = self._moments(heights).T
         u, rise = self.pipe.direction, self.rise
         scale = 3 * volume - heights * area
         lean = (soundings * area)[:, None] * (np.array([self.trim, self.list_]) - rise * u[:2])
@@ -144,8 +148,8 @@ class PipedMesh(Part):
             "scale": scale,
             "surface": self.sheared.wetted_m2(heights),
             "datum": rise * area,
-            "trim": soundings * u[0] * area - moment[:, 0],
-            "list": (1 + self.list_**2) * (soundings * u[1] * area - moment[:, 1]),
+            "trim": (soundings * u[0] * area - moment[0]) / self.marks_m,
+            "list": (1 + self.list_**2) * (soundings * u[1] * area - moment[1]),
             "pipe_x": self.trim * area,
             "pipe_y": self.list_ * area,
             "pipe_lean": lean,
@@ -157,21 +161,20 @@ class PipedMesh(Part):
     def _heights(self, levels_m):
         return self.rise * as_levels(levels_m)
 
-    def _moments_m3(self, heights):
-        """(rows, 2) first moments of the free surface by x and y about the pipe's lower end."""
+    def _moments(self, heights):
+        """(rows, 3) area of the free surface, its moments by x and y about the pipe's lower end."""
         part = self.sheared
         at = heights + part.zero_m
-        moments = moments_below(part.corners_m, self.plan_m, -part.plan_m2, at)
+        values = np.concatenate([np.ones_like(self.plan_m[..., :1]), self.plan_m], axis=2)
+        moments = moments_below(part.corners_m, values, -part.plan_m2, at)
         full = at >= part.height_m
         if full.any():  # as `MeshPart.area_m2` has it: the surface just below the top
-            top = moments_below(
-                part.corners_m, self.plan_m, -part.plan_m2, [part.height_m], side="right"
-            )
-            moments[full] = top
+            top = [part.height_m]
+            moments[full] = moments_below(part.corners_m, values, -part.plan_m2, top, "right")
         return moments
 
 
-def piped_mesh(mesh, pipe, trim=0.0, list_=0.0, *, scale=1.0, contracted=None):
+def piped_mesh(mesh, pipe, trim=0.0, list_=0.0, *, scale=1.0, contracted=None, marks_m=1.0):
     """The `PipedMesh` of a `meshes.Mesh` in the ship's frame.
 
     Parameters
@@ -186,6 +189,8 @@ def piped_mesh(mesh, pipe, trim=0.0, list_=0.0, *, scale=1.0, contracted=None):
         Of all lengths, by temperature and contraction.
     contracted : float or None
         The part of the scale that a uniform contraction has.
+    marks_m : float
+        Between the draught marks.
 
     Returns
     -------
@@ -222,4 +227,5 @@ def piped_mesh(mesh, pipe, trim=0.0, list_=0.0, *, scale=1.0, contracted=None):
         replace(part, surface_m2=own_m2),
         local[corners, :2],
         contracted,
+        marks_m,
     )

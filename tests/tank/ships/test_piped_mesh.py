@@ -7,7 +7,7 @@ from jacobians import assert_derivative
 from tankcal.tank.meshes import closed_mesh, mesh_part
 from tankcal.tank.ships import (
     Pipe,
-    corrections_of_cell,
+    corrections_of,
     in_ship_frame,
     piped_mesh,
     soundings_of_volumes,
@@ -54,7 +54,7 @@ def test_box_with_a_pipe_in_a_corner(trim, list_):
     middle = np.linspace(0.6, H - 0.6, 41)
     correction = x * trim + y * list_
     assert part.volume_m3(middle - correction) == pytest.approx(L * B * middle, abs=1e-9)
-    found = corrections_of_cell(part, even, middle - correction)
+    found = corrections_of([part], even, middle - correction)[0]
     assert set(found.state) == {""}
     assert found.even_m - (middle - correction) == pytest.approx(correction, abs=1e-11)
 
@@ -152,7 +152,7 @@ def test_signs():
         for sign in (1, -1):
             for side in (1, -1):
                 tilted = piped_mesh(mesh, upright(side * x, side * y), sign * trim, sign * list_)
-                found = corrections_of_cell(tilted, even, soundings)
+                found = corrections_of([tilted], even, soundings)[0]
                 assert np.sign(found.even_m - soundings)[0] == -sign * side
 
 
@@ -242,8 +242,8 @@ def test_round_trip_on_random_tanks(seed):
     trim, list_ = rng.uniform(-0.05, 0.05, 2)
     part, even = piped_mesh(mesh, pipe, trim, list_), piped_mesh(mesh, pipe)
     soundings = np.linspace(0, 1.1 * part.top_m, 60)
-    found = corrections_of_cell(part, even, soundings)
-    state = np.array(found.state)
+    found = corrections_of([part], even, soundings)[0]
+    state = found.state
     some = state == ""
     assert some.sum() > 40
     assert even.volume_m3(found.even_m[some]) == pytest.approx(
