@@ -126,6 +126,8 @@ def densities_of(result):
 
 def zero_of(result):
     """What heights of the table count from, as a code."""
+    if result.job.ship is not None:
+        return "pipe_bottom"
     if result.job.datum.dip_plate_z_m is not None:
         return "dip_plate"
     return "bottom" if result.job.tank.kind == "vertical" else f"{result.job.tank.kind}_bottom"
