@@ -404,7 +404,7 @@ def solid_of(result):
     if job.mesh is not None:
         return described(
             mesh_file=(job.mesh.file, None),
-            mesh_faces=(len(result.body.parts[0].solid.plan_m2), ""),
+            mesh_faces=(result.body.parts[0].solid.face_count, ""),
             full_capacity=(result.body.parts[0].capacity_m3, "m3"),
         )
     return None

@@ -129,10 +129,10 @@ def _corrections(book, record, cells):
     columns = [Column(f"{words['ship_sounding_m']}, m", soundings, 3, 12)]
     for cell in cells:
         values = [
-            book.word(f"ship_states.{state}") if state else 1000 * correction
+            book.paper.word(f"ship_states.{state}") if state else 1000 * correction
             for state, correction in zip(cell["state"], cell["correction_m"], strict=True)
         ]
-        heading = book.word("texts.ship_trim", trim=f"{cell['trim_m']:g}")
+        heading = book.paper.word("texts.ship_trim", trim=f"{cell['trim_m']:g}")
         columns.append(Column(f"{heading}, mm", values, 1, 14))
     spread = [ship.largest_U_m(cells, place) for place in range(len(soundings))]
     in_mm = [None if U is None else 1000 * U for U in spread]

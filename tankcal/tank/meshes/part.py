@@ -68,6 +68,11 @@ class MeshPart(Part):
     surface_m2: np.ndarray
 
     @property
+    def face_count(self):
+        """Number of triangles."""
+        return len(self.plan_m2)
+
+    @property
     def top_m(self):
         """The highest level."""
         return self.height_m - self.zero_m

@@ -81,7 +81,7 @@ class PipedMesh(Part):
         Tangents: by the stern and to starboard are positive.
     sheared : MeshPart
         The mesh under z', whose level 0 is that of the pipe's lower end.
-    plan_m : ndarray, shape (m, 3, 2)
+    corners_xy_m : ndarray, shape (m, 3, 2)
         x, y of the corners from the pipe's lower end, in the order of the corners of `sheared`.
     contracted : float or None
         Lengths of this mesh over those that were measured, by a uniform contraction; None: none
@@ -94,7 +94,7 @@ class PipedMesh(Part):
     trim: float
     list_: float
     sheared: MeshPart
-    plan_m: np.ndarray
+    corners_xy_m: np.ndarray
     contracted: float | None = None
     marks_m: float = 1.0
 
@@ -102,6 +102,11 @@ class PipedMesh(Part):
     def rise(self):
         """Rise of the surface at the pipe for each metre of sounding."""
         return self.pipe.rise(self.trim, self.list_)
+
+    @property
+    def face_count(self):
+        """Number of triangles."""
+        return self.sheared.face_count
 
     @property
     def top_m(self):
@@ -165,7 +170,7 @@ class PipedMesh(Part):
         """(rows, 3) area of the free surface, its moments by x and y about the pipe's lower end."""
         part = self.sheared
         at = heights + part.zero_m
-        values = np.concatenate([np.ones_like(self.plan_m[..., :1]), self.plan_m], axis=2)
+        values = np.concatenate([np.ones_like(self.corners_xy_m[..., :1]), self.corners_xy_m], axis=2)
         moments = moments_below(part.corners_m, values, -part.plan_m2, at)
         full = at >= part.height_m
         if full.any():  # as `MeshPart.area_m2` has it: the surface just below the top
