@@ -385,8 +385,7 @@ def _run(job, progress, part_progress, simulated, reading):
     liquid = measured and measured.result(made.levels_m)
     ship = None
     if job.ship is not None:
-        probability = table.probability
-        ship = ship_tables(job, survey, body, probability, progress=part_progress)
+        ship = ship_tables(job, survey, body, table, progress=part_progress)
     return Result(
         job=job,
         wall=measured_wall if isinstance(measured_wall, Wall) else None,

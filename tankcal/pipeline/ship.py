@@ -16,7 +16,9 @@ from tankcal.uncertainty import combine
 STEPS_M = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 ABOUT = 100  # soundings of a table whose step is not given
 MOST = 400_000  # corrections in all
-SLACK_M = 0.01  # that the lower end of a pipe may stand below the mesh, or its upper end below the top
+SLACK_M = (
+    0.01  # that the lower end of a pipe may stand below the mesh, or its upper end below the top
+)
 OF_SHIP = ("trim", "list")  # inputs that even keel does not have
 CLOSE = 1e-9  # of the capacity: a volume that falls by no more falls by rounding
 CORRECTING = message("correcting_soundings", "correcting soundings for trim and list")
@@ -35,7 +37,8 @@ class ShipTables:
     trim_m, list_rad : ndarray, shape (t,), (g,)
         By the stern, to starboard positive.
     state : ndarray of str, shape (t, g, s)
-        "", "full" (the tank is) or "below" (the table at even keel begins with more).
+        "", "full" (the tank is, to the millimetre that the table ends with) or "below" (the table
+        begins with more).
     correction_m, u_correction_m, U_correction_m : ndarray, shape (t, g, s)
     volume_m3, u_m3, U_m3 : ndarray, shape (t, g, s)
         Of the tank as it lies; without u where it is full.
@@ -96,7 +99,7 @@ def _place(xyz):
     return "({:.3f}, {:.3f}, {:.3f})".format(*xyz)
 
 
-def ship_tables(job, survey, body, probability, progress=None):
+def ship_tables(job, survey, body, table, progress=None):
     """The `ShipTables` of a job with a ship.
 
     Parameters
@@ -105,8 +108,8 @@ def ship_tables(job, survey, body, probability, progress=None):
     survey : meshes.Mesh
     body : Body
         The tank at even keel.
-    probability : float
-        Of coverage.
+    table : Capacity
+        Of that body.
     progress : callable, optional
         Called as progress(text, done, total).
 
@@ -123,7 +126,7 @@ def ship_tables(job, survey, body, probability, progress=None):
     cells = [heeled_body(job, survey, *one) for one in tangents]
     soundings = _soundings(job, cells)
     solids, level = [cell.parts[0].solid for cell in cells], body.parts[0].solid
-    found = corrections_of(solids, level, soundings)
+    found = corrections_of(solids, level, soundings, table.height_m[-1])
     _refuse_falling(job, found, level)
     readable = [np.isfinite(one.even_m) for one in found]
     inputs = tuple(body.derivatives(np.zeros(1)))
@@ -132,7 +135,7 @@ def ship_tables(job, survey, body, probability, progress=None):
     ends, made = np.cumsum([0, *(some.sum() for some in readable)]), []
     for index, (cell, one) in enumerate(zip(cells, found, strict=True)):
         rows = slice(ends[index], ends[index + 1])
-        made.append(_uncertainty(cell, one, soundings, even, rows, inputs, probability))
+        made.append(_uncertainty(cell, one, soundings, even, rows, inputs, table.probability))
         if progress is not None:
             progress(CORRECTING, index + 1, len(cells))
     shape = len(trims), len(lists)
@@ -221,6 +224,8 @@ def _differences(sources, some, even, rows):
     of_even, area = even[0], even[1][rows]
     per_area = np.divide(1.0, area, out=np.full(len(area), np.nan), where=area > 0)[:, None]
     return [
-        replace(one, columns_m3=(one.columns_m3[some] - other.columns_m3[rows]) * per_area, parts=())
+        replace(
+            one, columns_m3=(one.columns_m3[some] - other.columns_m3[rows]) * per_area, parts=()
+        )
         for one, other in zip(sources, of_even, strict=True)
     ]

@@ -53,7 +53,15 @@ CORRECTIONS = Table(
         _filed("U_m3"),
     ),
 )
-_OF_CELL = ("state", "correction_m", "u_correction_m", "U_correction_m", "volume_m3", "u_m3", "U_m3")
+_OF_CELL = (
+    "state",
+    "correction_m",
+    "u_correction_m",
+    "U_correction_m",
+    "volume_m3",
+    "u_m3",
+    "U_m3",
+)
 
 
 def corrections_columns(record):

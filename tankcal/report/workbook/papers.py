@@ -1,6 +1,16 @@
 """The working papers: courses, corrections, choices and provenance."""
 
-from tankcal.report.tables import clouds, hits, lines, liquid, radii, ship, strapping, tangents, tank
+from tankcal.report.tables import (
+    clouds,
+    hits,
+    lines,
+    liquid,
+    radii,
+    ship,
+    strapping,
+    tangents,
+    tank,
+)
 from tankcal.report.workbook.look import Column, number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
@@ -114,7 +124,7 @@ def radii_sheet(book, record):
 
 
 def ship_sheet(book, record):
-    """Corrections for trim and list: what the pipe shows at the ends, and a matrix for each list."""
+    """Corrections for trim and list: where the pipe ends to tell, and a matrix for each list."""
     sheet = book.sheet("ship", book.word("texts.ship_subtitle"), landscape=True)
     tables = [(book.word("headings.ship_cells"), "ship_cells", columns_of(book, ship.CELLS))]
     for number, (list_deg, cells) in enumerate(ship.by_list(record), 1):

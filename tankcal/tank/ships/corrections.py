@@ -30,10 +30,10 @@ class CellCorrections:
     Attributes
     ----------
     volume_m3 : ndarray, shape (rows,)
-        At each sounding; the capacity where the tank is full.
+        At each sounding, no more than the capacity.
     state : ndarray of str, shape (rows,)
-        "" where the sounding has a correction; "full" where the tank is; "below" where the volume
-        is less than the table at even keel begins with.
+        "" where the sounding has a correction; "full" where the tank is, or the table at even keel
+        ends with less; "below" where it begins with more.
     even_m : ndarray, shape (rows,)
         Soundings at even keel of the same volume; nan where there is none.
     dry_m3 : float
@@ -52,7 +52,7 @@ class CellCorrections:
     interpolated_m: float
 
 
-def corrections_of(parts, even, soundings_m):
+def corrections_of(parts, even, soundings_m, top_m=np.inf):
     """`CellCorrections` of each trim and list, their volumes inverted all at once.
 
     Parameters
@@ -63,6 +63,9 @@ def corrections_of(parts, even, soundings_m):
         At even keel.
     soundings_m : ndarray, shape (rows,)
         From the pipe's lower end, 0 first, ascending.
+    top_m : float, optional
+        Sounding that the table at even keel ends at, a whole millimetre: what is above it counts
+        as full.
 
     Returns
     -------
@@ -76,6 +79,8 @@ def corrections_of(parts, even, soundings_m):
     below = ~full & (volumes < even.dry_m3)
     even_m = np.full(volumes.shape, np.nan)
     even_m[~full & ~below] = soundings_of_volumes(even, volumes[~full & ~below])
+    full |= even_m > top_m
+    even_m[full] = np.nan
     state = np.where(full, FULL, np.where(below, BELOW, READABLE))
     rows = len(soundings)
     return [

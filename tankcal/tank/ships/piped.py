@@ -170,7 +170,9 @@ class PipedMesh(Part):
         """(rows, 3) area of the free surface, its moments by x and y about the pipe's lower end."""
         part = self.sheared
         at = heights + part.zero_m
-        values = np.concatenate([np.ones_like(self.corners_xy_m[..., :1]), self.corners_xy_m], axis=2)
+        values = np.concatenate(
+            [np.ones_like(self.corners_xy_m[..., :1]), self.corners_xy_m], axis=2
+        )
         moments = moments_below(part.corners_m, values, -part.plan_m2, at)
         full = at >= part.height_m
         if full.any():  # as `MeshPart.area_m2` has it: the surface just below the top

@@ -1,5 +1,7 @@
 """A mesh at trim and list: closed forms of a box, quadrature, trimesh as second program."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from jacobians import assert_derivative
@@ -43,7 +45,7 @@ def leaning(mesh, seed):
     return Pipe(foot, foot + (*rng.uniform(-2, 2, 2), 8.0))
 
 
-@pytest.mark.parametrize("trim, list_", [(0.02, 0.0), (-0.03, 0.05), (0.01, -0.08)])
+@pytest.mark.parametrize(("trim", "list_"), [(0.02, 0.0), (-0.03, 0.05), (0.01, -0.08)])
 def test_box_with_a_pipe_in_a_corner(trim, list_):
     """Closed form: while the surface cuts neither base nor top, V = l b h_c with h_c in the middle,
     and the correction of a sounding is x_p tan(trim) + y_p tan(list).
@@ -80,7 +82,7 @@ def depth_over_plan(level, trim, list_):
     def pieces(low, high, edges):
         inside = sorted(edge for edge in edges if low < edge < high)
         ends = [low, *inside, high]
-        return list(zip(ends[:-1], ends[1:], strict=True))
+        return list(pairwise(ends))
 
     total = 0.0
     corners = [(level - wall - list_ * y) / trim for wall in (0, H) for y in (-B / 2, B / 2)]
