@@ -79,6 +79,7 @@ def test_the_table_is_that_of_the_mesh(tmp_path):
         assert getattr(of_ship, name) == pytest.approx(getattr(today, name), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_linear_u_against_monte_carlo(tmp_path, figure):
     """Simulation: every input drawn, volumes and corrections of each draw computed anew. The offset
     of the surface is not among them; it has its own closed form in tests/tank/ships.
