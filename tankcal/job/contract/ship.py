@@ -47,13 +47,13 @@ KEYS = (
     _several(
         "pipe_top_m",
         "upper end of the sounding pipe: x; y; z in the frame of the mesh, metres",
-        1e5,
+        1e8,
     ),
     _several(
         "pipe_bottom_m",
         "lower end of the sounding pipe, which soundings count from: x; y; z in the frame of the"
         " mesh, metres",
-        1e5,
+        1e8,
     ),
     positive(
         "correction_step_m",
