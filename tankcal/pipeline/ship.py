@@ -46,6 +46,8 @@ class ShipTables:
         Volume at which the pipe becomes dry, and sounding at which the tank becomes full.
     interpolated_m : float
         Largest error of a correction that is interpolated half way between two soundings.
+    undeclared : tuple of str
+        Inputs that move corrections and have no u.
     """
 
     sounding_m: np.ndarray
@@ -61,6 +63,7 @@ class ShipTables:
     dry_m3: np.ndarray
     full_m: np.ndarray
     interpolated_m: float
+    undeclared: tuple[str, ...]
 
 
 def check_pipe(job, mesh):
@@ -155,6 +158,7 @@ def ship_tables(job, survey, body, table, progress=None):
         on_grid([one.dry_m3 for one in found]),
         on_grid([one.full_m for one in found]),
         max(one.interpolated_m for one in found),
+        undeclared_of_ship(job, survey),
     )
 
 

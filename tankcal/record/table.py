@@ -164,12 +164,18 @@ def choices_of(result):
         "coverage": job.table.coverage_probability,
         "k": "normal" if np.all(np.isinf(result.table.dof)) else "student",
         "expansion": "given" if job.material.expansion_given else "default",
-        "not_in_budget": list(result.body.undeclared()),
+        "not_in_budget": _not_in_budget(result),
     }
     if result.adjustment is not None:
         of_survey = _adjustment_values(result.adjustment, getattr(job, "measurements", None))
         values = of_survey | values
     return [Choice(*one) for one in values.items()]
+
+
+def _not_in_budget(result):
+    """Inputs without u, those of the table first, then what moves only corrections of a ship."""
+    of_ship = () if result.ship is None else result.ship.undeclared
+    return list(dict.fromkeys((*result.body.undeclared(), *of_ship)))
 
 
 def adjustment_choices(adjustment, measurements):
