@@ -131,16 +131,7 @@ def ship_tables(job, survey, body, table, progress=None):
     solids, level = [cell.parts[0].solid for cell in cells], body.parts[0].solid
     found = corrections_of(solids, level, soundings, table.height_m[-1])
     _refuse_falling(job, found, level)
-    readable = [np.isfinite(one.even_m) for one in found]
-    inputs = tuple(body.derivatives(np.zeros(1)))
-    even_m = np.concatenate([one.even_m[some] for one, some in zip(found, readable, strict=True)])
-    even = body.sources_by(even_m, inputs, without=OF_SHIP), body.area_m2(even_m)
-    ends, made = np.cumsum([0, *(some.sum() for some in readable)]), []
-    for index, (cell, one) in enumerate(zip(cells, found, strict=True)):
-        rows = slice(ends[index], ends[index + 1])
-        made.append(_uncertainty(cell, one, soundings, even, rows, inputs, table.probability))
-        if progress is not None:
-            progress(CORRECTING, index + 1, len(cells))
+    made = _uncertainties(cells, found, soundings, body, table.probability, progress)
     shape = len(trims), len(lists)
 
     def on_grid(values):
@@ -189,7 +180,7 @@ def _soundings(job, cells):
             most=MOST,
         )
         raise InputError(Problem("job.toml", expected, column="ship.correction_step_m"))
-    soundings = step * np.arange(count)
+    soundings = np.round(step * np.arange(count), 9)
     return soundings[soundings <= ship_pipe(ship).length_m * (1 + 1e-12)]
 
 
@@ -205,18 +196,38 @@ def _refuse_falling(job, found, level):
             raise InputError(Problem(job.mesh.file, expected))
 
 
+def _uncertainties(cells, found, soundings, body, probability, progress):
+    """What `_uncertainty` gives of each cell; the table at even keel is read for all at once."""
+    readable = [one.even_m[np.isfinite(one.even_m)] for one in found]
+    even_m, ends = np.concatenate(readable), np.cumsum([0, *map(len, readable)])
+    inputs = tuple(body.derivatives(np.zeros(1)))
+    even, made = None, []
+    if len(even_m):
+        even = body.sources_by(even_m, inputs, without=OF_SHIP), body.area_m2(even_m)
+    for index, (cell, one) in enumerate(zip(cells, found, strict=True)):
+        rows = slice(ends[index], ends[index + 1])
+        made.append(_uncertainty(cell, one, soundings, even, rows, inputs, probability))
+        if progress is not None:
+            progress(CORRECTING, index + 1, len(cells))
+    return made
+
+
 def _uncertainty(cell, found, soundings, even, rows, inputs, probability):
     """{name: (rows,)} u and U of the volumes and of the corrections of one trim and list.
 
-    even  sources and areas of the table at even keel, all cells' one after the other; rows: the
-          cell's in them
+    even  sources and areas of the table at even keel, all cells' one after the other, None where
+          nothing is corrected; rows: the cell's in them
     """
     names = ("u_correction", "U_correction", "u", "U")
     columns = {name: np.full(len(soundings), np.nan) for name in names}
     known, some = found.state != FULL, np.isfinite(found.even_m)
+    if not known.any():
+        return columns
     sources = cell.sources_by(soundings[known], inputs)
     volume = combine(sources, int(known.sum()))
     columns["u"][known], columns["U"][known] = volume.u, volume.expanded(probability)
+    if not some.any():
+        return columns
     moved = combine(_differences(sources, some[known], even, rows), int(some.sum()))
     columns["u_correction"][some] = moved.u
     columns["U_correction"][some] = moved.expanded(probability)

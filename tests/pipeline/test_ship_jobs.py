@@ -156,6 +156,20 @@ def test_the_soundings_end_with_the_full_tank_or_the_pipe(tmp_path):
     assert np.array_equal(np.isnan(longer.correction_m), longer.state != "")
 
 
+def test_no_sounding_has_a_correction(tmp_path):
+    """A step beyond the tank, where a dry pipe hides less than at even keel."""
+    settings = {
+        "ship.pipe_bottom_m": [-5.5, -2.5, 1.0],
+        "ship.trim_m": [5.0],
+        "ship.list_deg": [10.0],
+        "ship.correction_step_m": 5.5,
+    }
+    ship = result_of(tmp_path / "job", settings=settings).ship
+    assert set(ship.state.ravel()) <= {"below", "full"}
+    assert np.all(np.isnan(ship.correction_m))
+    assert np.isfinite(ship.u_m3[ship.state == "below"]).all()
+
+
 BAD = [
     ({"ship.pipe_bottom_m": [-5.5, -3.5, 0.0]}, "ship.pipe_bottom_m", "outside the mesh"),
     ({"ship.pipe_bottom_m": [-5.5, -2.5, -0.2]}, "ship.pipe_bottom_m", "outside the mesh"),
