@@ -1,7 +1,7 @@
 """What is said of a [ship] that cannot be: one line for each problem, all in one run."""
 
 import pytest
-from job_builder import job_parts, write_folder
+from job_builder import job_parts, write_book, write_folder
 
 from tankcal.errors import InputError
 from tankcal.job import load
@@ -83,3 +83,16 @@ def test_inputs_without_a_ship(tmp_path, name, unit):
 def test_blank_is_no_ship(tmp_path):
     job = load(write_folder(tmp_path / "job", job_parts(kind="mesh", mesh=b"solid")))
     assert job.ship is None
+
+
+def test_a_workbook_gives_the_same_ship(tmp_path):
+    """Lists of a workbook are texts with semicolons between, one number stands for itself."""
+    folder = load(write_folder(tmp_path / "job", job_parts(kind="mesh", mesh=b"s", settings=SHIP)))
+    texts = {
+        "ship.trim_m": "2; -1; 0",
+        "ship.list_deg": "0; 1.5",
+        "ship.pipe_bottom_m": "-5.5; -2.5; 0",
+        "ship.pipe_top_m": "-5.5; -2.5; 6",
+    }
+    parts = job_parts(kind="mesh", mesh=b"s", settings=SHIP | texts)
+    assert load(write_book(tmp_path / "job.xlsx", parts)).ship == folder.ship
