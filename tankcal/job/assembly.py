@@ -10,6 +10,7 @@ from tankcal.job.checks.extent import is_strapped
 from tankcal.job.contract import INPUTS
 from tankcal.job.contract.bottom import bottom_form
 from tankcal.job.contract.parts import MESH_UNITS_M
+from tankcal.job.contract.ship import BOW_DEG, is_ship
 from tankcal.job.contract.uncertainty import spreads, standard_u
 from tankcal.job.model import (
     Bottom,
@@ -26,6 +27,7 @@ from tankcal.job.model import (
     Points,
     Ring,
     Roof,
+    Ship,
     Sphere,
     StatedVolume,
     Survey,
@@ -179,6 +181,7 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         circumference_m=values["checks"]["circumference_m"],
         diameter_is=values["checks"]["diameter_is"],
         mesh=_mesh(values["mesh"], attached.mesh[1]) if kind == "mesh" else None,
+        ship=_ship(values["ship"]) if kind == "mesh" and is_ship(values) else None,
     )
 
 
@@ -372,6 +375,20 @@ def _end(values, end):
 
 def _sphere(values):
     return Sphere(values["diameter_m"], (values["thickness_mm"] or 0.0) / 1000)
+
+
+def _ship(values):
+    bow, contraction = values["bow_azimuth_deg"], values["contraction_percent"]
+    return Ship(
+        tuple(sorted(values["trim_m"])),
+        values["length_between_marks_m"],
+        tuple(sorted(float(np.radians(one)) for one in values["list_deg"])),
+        float(np.radians(BOW_DEG if bow is None else bow)),
+        values["pipe_bottom_m"],
+        values["pipe_top_m"],
+        values["correction_step_m"],
+        None if contraction is None else contraction / 100,
+    )
 
 
 def _mesh(values, data):

@@ -28,6 +28,7 @@ from tankcal.pipeline.radii_wall import RadiiWall
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.ringed_wall import RingedWall
 from tankcal.pipeline.scan import Scan
+from tankcal.pipeline.ship import ShipTables, ship_tables
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
 from tankcal.pipeline.stadia_checks import check_bases
@@ -99,6 +100,8 @@ class Result:
         The wall of declared radii, with what was measured again in them.
     rings : ringed_wall.RingedWall or None
         The rings of a lying cylinder that a tape was put round.
+    ship : ship.ShipTables or None
+        Corrections of soundings for trim and list, of a tank of a ship.
     body : body.Body
         The tank as the sum of its parts, with all corrections that are on.
     zero_m : float
@@ -158,6 +161,7 @@ class Result:
     nominal: NominalWall | None = None
     radii: RadiiWall | None = None
     rings: RingedWall | None = None
+    ship: ShipTables | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -383,6 +387,9 @@ def _run(job, progress, part_progress, simulated, reading):
         simulation = simulate_table(job, survey, body, zero, table, pairs, progress=part_progress)
         intervals = simulation.intervals(table)
     liquid = measured and measured.result(made.levels_m)
+    ship = None
+    if job.ship is not None:
+        ship = ship_tables(job, survey, body, table, progress=part_progress)
     return Result(
         job=job,
         wall=measured_wall if isinstance(measured_wall, Wall) else None,
@@ -415,6 +422,7 @@ def _run(job, progress, part_progress, simulated, reading):
         nominal=survey if isinstance(survey, NominalWall) else None,
         radii=radii,
         rings=survey if isinstance(survey, RingedWall) else None,
+        ship=ship,
     )
 
 

@@ -20,6 +20,7 @@ from tankcal.pipeline.partial_survey import update_by_survey
 from tankcal.pipeline.radii_wall import RadiiWall, find_radii_wall
 from tankcal.pipeline.ringed_wall import find_ringed_wall
 from tankcal.pipeline.scan import Scan, fit_scan
+from tankcal.pipeline.ship import check_pipe
 from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.survey_warnings import refuse_undetermined
 from tankcal.pipeline.tangent_wall import find_tangent_wall
@@ -150,7 +151,9 @@ def _survey(job, progress, dof, amplitudes):
         return find_wall(job, progress, dof, amplitudes)
     if job.mesh is not None:
         progress(message("checking_mesh", "checking the mesh {file}", file=job.mesh.file))
-        return parse_mesh(job.mesh.file, job.mesh.data, job.mesh.unit_m)
+        mesh = parse_mesh(job.mesh.file, job.mesh.data, job.mesh.unit_m)
+        check_pipe(job, mesh)
+        return mesh
     if job.points is not None:
         progress(
             message(

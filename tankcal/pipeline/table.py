@@ -18,6 +18,7 @@ from tankcal.pipeline.radii_wall import RadiiWall
 from tankcal.pipeline.ring_checks import check_rings
 from tankcal.pipeline.ringed_wall import RingedWall
 from tankcal.pipeline.scan import Scan
+from tankcal.pipeline.ship import undeclared_of_ship
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.strapping_checks import check_strapped, check_straps_beside_points
 from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
@@ -154,9 +155,14 @@ def check_table(job, survey, made, sighting=None):
     return (
         *_doubts_of_survey(job, survey, made.top_m),
         *_doubts_of_sights(job, survey, sighting),
-        *warn_of_undeclared(made.body.undeclared()),
+        *warn_of_undeclared(_undeclared(job, survey, made.body)),
         *against_nominal(job.tank, made.table.volume_m3[-1]),
     )
+
+
+def _undeclared(job, survey, body):
+    """Inputs without u, those of the table first, then what moves only corrections of a ship."""
+    return tuple(dict.fromkeys((*body.undeclared(), *undeclared_of_ship(job, survey))))
 
 
 def _doubts_of_sights(job, survey, sighting):

@@ -19,6 +19,7 @@ from tankcal.record.liquid import LiquidRecord, liquid_of
 from tankcal.record.plain_data import to_plain
 from tankcal.record.radii import RadiiRecord, radii_of
 from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.ship import ShipRecord, ship_of
 from tankcal.record.strapping import StrappingRecord, strapping_of
 from tankcal.record.tangents import TangentsRecord, tangents_of
 from tankcal.record.versions import FORMAT
@@ -80,6 +81,9 @@ class Record(Saved, kw_only=True):
     radii: RadiiRecord | None = key(
         "radii out of a former table; left out where there are none", default=None, optional=True
     )
+    ship: ShipRecord | None = key(
+        "corrections for trim and list; left out where there are none", default=None, optional=True
+    )
     courses: list[survey.CourseOfShell] = key("from the bottom up", default=())
     capacity: table.CapacityTable | None = key("the table", default=None)
     interpolation: table.InterpolationError | None = key("between rows", default=None)
@@ -122,6 +126,7 @@ def record_of(result):
             tangents=tangents_of(result),
             liquid=liquid_of(result),
             radii=radii_of(result),
+            ship=ship_of(result),
             courses=survey.courses_of(result),
             capacity=table.capacity_of(result),
             interpolation=filled_from(table.InterpolationError, result.straightness),

@@ -126,6 +126,8 @@ def densities_of(result):
 
 def zero_of(result):
     """What heights of the table count from, as a code."""
+    if result.job.ship is not None:
+        return "pipe_bottom"
     if result.job.datum.dip_plate_z_m is not None:
         return "dip_plate"
     return "bottom" if result.job.tank.kind == "vertical" else f"{result.job.tank.kind}_bottom"
@@ -163,12 +165,18 @@ def choices_of(result):
         "coverage": job.table.coverage_probability,
         "k": "normal" if np.all(np.isinf(result.table.dof)) else "student",
         "expansion": "given" if job.material.expansion_given else "default",
-        "not_in_budget": list(result.body.undeclared()),
+        "not_in_budget": _not_in_budget(result),
     }
     if result.adjustment is not None:
         of_survey = _adjustment_values(result.adjustment, getattr(job, "measurements", None))
         values = of_survey | values
     return [Choice(*one) for one in values.items()]
+
+
+def _not_in_budget(result):
+    """Inputs without u, those of the table first, then what moves only corrections of a ship."""
+    of_ship = () if result.ship is None else result.ship.undeclared
+    return list(dict.fromkeys((*result.body.undeclared(), *of_ship)))
 
 
 def adjustment_choices(adjustment, measurements):
@@ -417,7 +425,7 @@ def solid_of(result):
     if job.mesh is not None:
         return described(
             mesh_file=(job.mesh.file, None),
-            mesh_faces=(len(result.body.parts[0].solid.plan_m2), ""),
+            mesh_faces=(result.body.parts[0].solid.face_count, ""),
             full_capacity=(result.body.parts[0].capacity_m3, "m3"),
         )
     return None

@@ -37,6 +37,7 @@ from tankcal.job.contract.deadwood import check_deadwood
 from tankcal.job.contract.lying import check_horizontal, check_sphere
 from tankcal.job.contract.points import check_points
 from tankcal.job.contract.roof import check_roof
+from tankcal.job.contract.ship import check_ship
 from tankcal.job.contract.stated import check_stated
 from tankcal.job.contract.uncertainty import check_inputs
 from tankcal.job.contract.welds import check_welds
@@ -117,5 +118,7 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
         check_horizontal(values, wall_of(tables), raw, log, height_of_rings(tables))
     if kind == "sphere":
         check_sphere(values, has_wall_points(tables), raw, log)
+    if kind == "mesh":
+        check_ship(values, tables, raw, log)
     if tables["deadwood"] is not None:
         check_deadwood(tables["deadwood"], extent, log)

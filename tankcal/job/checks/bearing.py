@@ -13,6 +13,7 @@ from tankcal.job.checks.extent import (
 )
 from tankcal.job.contract import INPUTS
 from tankcal.job.contract.bottom import bottom_form
+from tankcal.job.contract.ship import is_ship
 from tankcal.messages import message
 
 NOT_SUBTRACTED = message(
@@ -39,6 +40,8 @@ def useless_inputs(values, tables, kind):
         rules |= _of_horizontal(values, tables)
     elif kind == "sphere":
         rules |= _of_wall(values["sphere"], values, has_wall_points(tables))
+    elif kind == "mesh":
+        rules |= _of_ship(values)
     return others | {name: why for name, why in rules.items() if why}
 
 
@@ -212,6 +215,17 @@ def _of_rings(values, tables):
         if one
         else "",
     }
+
+
+def _of_ship(values):
+    """What a tank has that is sounded along a pipe on a ship."""
+    no_pipe = message("no_ship", "expected only with [ship]")
+    no_contraction = message("no_contraction", "expected only with ship.contraction_percent")
+    contracts = values["ship"]["contraction_percent"] is not None
+    of_pipe = dict.fromkeys(
+        ("trim", "list", "pipe_x", "pipe_y", "pipe_lean"), "" if is_ship(values) else no_pipe
+    )
+    return of_pipe | {"contraction": "" if contracts else no_contraction}
 
 
 def _of_wall(given, values, has_points):

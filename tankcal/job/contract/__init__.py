@@ -17,6 +17,7 @@ from tankcal.job.contract import (
     radii,
     rings,
     roof,
+    ship,
     stadia,
     stated,
     strapping,
@@ -35,7 +36,8 @@ from tankcal.job.contract.uncertainty import INPUTS
 from tankcal.text.form_words import NOTES
 
 SECTIONS = (
-    *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "bottom", "roof"),
+    *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "ship"),
+    *("bottom", "roof"),
     *("shell", "strapping", "liquid", "radii", "change"),
     *("corrections", "material", "checks"),
     *("adjustment", "adjustment.camera", "certificate"),
@@ -46,7 +48,7 @@ COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES}
 COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | tangents.COLUMNS | stadia.COLUMNS
 COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS | rings.COLUMNS | SURVEY_COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS | radii.KEYS
-_KEYS |= {"bottom": bottom.KEYS, "roof": roof.KEYS}
+_KEYS |= {"bottom": bottom.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
 
 SURVEYS = ADJUSTED_SURVEYS | {

@@ -1,6 +1,7 @@
 """uncertainty.csv: what it may declare, what is assumed without it, its columns and its checks."""
 
 from dataclasses import dataclass
+from math import degrees
 
 from tankcal.gum.distributions import FAMILIES, expanded, within
 from tankcal.job.checking import refuse_repeated
@@ -51,6 +52,10 @@ class Declarable:
 
 def _of_shell(unit, per_si, largest, note, **more):
     return Declarable(unit, per_si, largest, note, VERTICAL, **more)
+
+
+def _of_ship(unit, per_si, largest, note, **more):
+    return Declarable(unit, per_si, largest, note, ("mesh",), **more)
 
 
 def _of_lying(unit, per_si, largest, note, **more):
@@ -123,6 +128,14 @@ INPUTS = {
         correlates=False,
     ),
     "surface": Declarable("mm", 1e3, 200, "offset of the mesh's surface from the wall", ("mesh",)),
+    "trim": _of_ship("mm", 1e3, 1000, "trim of a ship: draught aft less draught forward"),
+    "list": _of_ship("deg", degrees(1), 5, "list of a ship"),
+    "pipe_x": _of_ship("mm", 1e3, 1000, "place of the sounding pipe fore and aft"),
+    "pipe_y": _of_ship("mm", 1e3, 1000, "place of the sounding pipe athwart"),
+    "pipe_lean": _of_ship(
+        "mm/m", 1e3, 50, "lean of the sounding pipe, fore and aft and athwart", correlates=False
+    ),
+    "contraction": _of_ship("%", 100, 0.5, "uniform contraction of all lengths"),
     "interpolation": Declarable(
         "m3", 1, 100, "straight line between two rows, of each reading", correlates=False
     ),

@@ -13,6 +13,7 @@ from tankcal.job.model.parts import (
     Mesh,
     Ring,
     Roof,
+    Ship,
     Sphere,
 )
 from tankcal.job.model.radii import Change, Radii
@@ -53,6 +54,7 @@ __all__ = [
     "Radii",
     "Ring",
     "Roof",
+    "Ship",
     "Sphere",
     "StatedVolume",
     "Survey",
@@ -93,6 +95,8 @@ class Job:
         None without a floating roof.
     horizontal, sphere, mesh
         None for the other kinds of tank.
+    ship : Ship or None
+        Of a mesh: trims, lists and the pipe of a tank that goes to sea.
     measurements : Measurements or None
         The survey that the points are to be adjusted from.
     inputs : tuple of DeclaredInput
@@ -150,6 +154,7 @@ class Job:
     horizontal: Horizontal | None = None
     sphere: Sphere | None = None
     mesh: Mesh | None = None
+    ship: Ship | None = None
     measurements: Measurements | None = None
     correlations: tuple[tuple[str, str, float], ...] = ()
     stated: tuple[StatedVolume, ...] = ()

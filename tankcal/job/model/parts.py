@@ -216,6 +216,38 @@ class Sphere:
 
 
 @dataclass(frozen=True)
+class Ship:
+    """What a ship adds to a tank of a mesh: how she lies, and the pipe that is sounded.
+
+    Attributes
+    ----------
+    trim_m : tuple of float
+        Draught aft less draught forward, of the tables of corrections, ascending.
+    length_between_marks_m : float
+        Of the draughts.
+    list_rad : tuple of float
+        To starboard, ascending.
+    bow_azimuth_rad : float
+        Clockwise from +y of the mesh's frame.
+    pipe_bottom_m, pipe_top_m : tuple of float
+        Ends of the sounding pipe in the mesh's frame.
+    correction_step_m : float or None
+        Of the soundings of corrections; None: chosen.
+    contraction : float or None
+        Share by which all lengths are shorter in service than as measured; None: not given.
+    """
+
+    trim_m: tuple[float, ...]
+    length_between_marks_m: float
+    list_rad: tuple[float, ...]
+    bow_azimuth_rad: float
+    pipe_bottom_m: tuple[float, float, float]
+    pipe_top_m: tuple[float, float, float]
+    correction_step_m: float | None = None
+    contraction: float | None = None
+
+
+@dataclass(frozen=True)
 class Mesh:
     """A closed mesh of the inside.
 

@@ -67,6 +67,7 @@ SECTION_NOTES = {
     "horizontal": "the cylinder and its ends; sizes as measured, inside or outside (survey.side)",
     "sphere": "the sphere; its size as measured, inside or outside (survey.side)",
     "mesh": "the closed surface of the inside",
+    "ship": "only of a tank of a ship: trims, lists and the sounding pipe; all of it, or nothing",
     "bottom": "what the bottom is like; see bottom.csv, too",
     "roof": "the floating roof: all of it, or nothing when there is none",
     "corrections": "false switches a correction off, and the report says so",

@@ -1,7 +1,7 @@
 """From a checked job to the body of its tank: every part, with the corrections that are on."""
 
 from tankcal.pipeline.tanks.common import as_declared, thermal_scale
-from tankcal.pipeline.tanks.solid import sized_job, solid_body, solid_zero
+from tankcal.pipeline.tanks.solid import ship_pipe, sized_job, solid_body, solid_zero
 from tankcal.pipeline.tanks.vertical import (
     critical_zone,
     insets_of,
@@ -14,8 +14,10 @@ __all__ = [
     "as_declared",
     "body_of",
     "critical_zone",
+    "heeled_body",
     "insets_of",
     "shell_volume",
+    "ship_pipe",
     "sized_job",
     "thermal_scale",
     "zero_height",
@@ -34,6 +36,11 @@ def body_of(job, survey, switches=None, uncertain=True):
     if job.tank.kind == "vertical":
         return vertical_body(job, survey, switches, uncertain)
     return solid_body(job, survey, switches)
+
+
+def heeled_body(job, survey, trim, list_):
+    """The tank of a ship at tangents of trim and list; levels are soundings along its pipe."""
+    return solid_body(job, survey, job.switches, (trim, list_))
 
 
 def zero_height(job, survey):

@@ -35,6 +35,7 @@ def estimates_of(job):
         "survey_density": survey.liquid_density_kg_m3,
         "roof_mass": job.roof and job.roof.mass_kg,
         **_of_solid(job),
+        **_of_ship(job),
     }
     return {name: value for name, value in given.items() if value is not None}
 
@@ -56,6 +57,17 @@ def _of_solid(job):
         "end_depth": _only([1000 * depth for depth in depths]),
         "tilt": _thousand(lying.tilt),
         "dip_position": _thousand(lying.dip_from_a_m),
+    }
+
+
+def _of_ship(job):
+    """Even keel, the pipe's place in the ship's frame as the mesh has it, and a contraction."""
+    if job.ship is None:
+        return {}
+    share = job.ship.contraction
+    return {
+        **dict.fromkeys(("trim", "list", "pipe_x", "pipe_y", "pipe_lean"), 0.0),
+        "contraction": None if share is None else 100 * share,
     }
 
 

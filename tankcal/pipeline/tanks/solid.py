@@ -14,11 +14,16 @@ from tankcal.pipeline.tanks.common import (
 from tankcal.pipeline.tanks.rings import ringed_part
 from tankcal.tank.body import Body, SolidPart
 from tankcal.tank.meshes import mesh_part
+from tankcal.tank.ships import Pipe, in_ship_frame, piped_mesh
 from tankcal.tank.solids import LyingTank, Sphere
 
 
-def solid_body(job, survey, switches):
-    part = ringed_part(job, survey, switches) if job.rings else _part(job, survey, switches)
+def solid_body(job, survey, switches, heel=(0.0, 0.0)):
+    """The `Body` of a solid; heel: tangents of trim and list of a tank of a ship."""
+    if job.rings:
+        part = ringed_part(job, survey, switches)
+    else:
+        part = _part(job, survey, switches, heel)
     parts, zero = [part], solid_zero(job)
     if switches.deadwood and job.deadwood:
         parts.append(deadwood_part(job.deadwood, zero))
@@ -32,7 +37,7 @@ def solid_body(job, survey, switches):
     )
 
 
-def _part(job, survey, switches):
+def _part(job, survey, switches, heel):
     """`SolidPart` of a tank of declared sizes, of points, or of a mesh."""
     scale = thermal_scale(job, switches)
     job = sized_job(job, survey)
@@ -45,7 +50,7 @@ def _part(job, survey, switches):
     elif job.horizontal is not None:
         solid = _lying(job.horizontal, plate, scale)
     else:
-        solid = _of_mesh(job, survey, scale)
+        solid = _of_mesh(job, survey, scale, heel)
     return SolidPart(
         solid,
         scale,
@@ -112,13 +117,34 @@ def _of_scan(scan, scale):
     return {"surveyed": scan.names, "form": replace(scan.form, factors=factors)}
 
 
-def _of_mesh(job, mesh, scale):
-    """The part that a mesh encloses; levels count from the dip plate or from its lowest point."""
+def _of_mesh(job, mesh, scale, heel):
+    """The part that a mesh encloses; levels count from the dip plate or from its lowest point, on
+    a ship along the pipe from its lower end.
+    """
+    if job.ship is not None:
+        return _on_ship(job.ship, mesh, scale, heel)
     warmed = replace(mesh, vertices_m=scale * mesh.vertices_m)
     zero = job.datum.dip_plate_z_m
     if zero is None:
         zero = job.datum.bottom_z_m
     return mesh_part(warmed, zero if zero is None else scale * zero)
+
+
+def ship_pipe(ship):
+    """The `Pipe` of a `Ship` in her own frame."""
+    return Pipe(*in_ship_frame([ship.pipe_bottom_m, ship.pipe_top_m], ship.bow_azimuth_rad))
+
+
+def _on_ship(ship, mesh, scale, heel):
+    contracted = None if ship.contraction is None else 1 - ship.contraction
+    return piped_mesh(
+        replace(mesh, vertices_m=in_ship_frame(mesh.vertices_m, ship.bow_azimuth_rad)),
+        ship_pipe(ship),
+        *heel,
+        scale=scale * (contracted or 1.0),
+        contracted=contracted,
+        marks_m=ship.length_between_marks_m,
+    )
 
 
 def _lying(tank, plate_m, scale):

@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.job.covariance import MAX_POINTS
 from tankcal.report.outputs.csv_files import write_table
-from tankcal.report.tables import capacity, lines, liquid, readings, strapping, survey, tank
+from tankcal.report.tables import capacity, lines, liquid, readings, ship, strapping, survey, tank
 from tankcal.text.digits import PROGRAM, decimals_of_rows, fixed
 
 LEAST_DECIMALS = 6  # micrometres, square millimetres, millilitres
@@ -16,6 +16,7 @@ FILES = (
     "offsets.csv",
     "liquid_steps.csv",
     "capacity.csv",
+    "ship_corrections.csv",
     "photos.csv",
     "cameras.csv",
     "groups.csv",
@@ -34,6 +35,8 @@ def write_tables(record, directory):
         tables["liquid_steps"] = liquid.STEPS, None
     if record["capacity"]:
         tables["capacity"] = capacity.capacity_table(record), _capacity(record)
+    if record.get("ship"):
+        tables["ship_corrections"] = ship.CORRECTIONS, ship.corrections_columns(record)
     if record["adjustment"]:
         cameras, observed = (record["adjustment"][key] for key in ("cameras", "residuals"))
         free = dict.fromkeys(name for camera in cameras for name in camera["free"])

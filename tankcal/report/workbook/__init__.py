@@ -18,6 +18,7 @@ from tankcal.report.workbook.papers import (
     liquid_sheet,
     provenance_sheet,
     radii_sheet,
+    ship_sheet,
     strapping_sheet,
     tangents_sheet,
 )
@@ -49,6 +50,7 @@ _SHOWN_OF_TANK = (
     "proportional_parts",
     "other_densities",
     "dip_calculator",
+    "ship",
 )
 _OF_SURVEYS = {  # sheets of what a wall was surveyed with, by the part of the record
     "strapping": strapping_sheet,
@@ -58,6 +60,7 @@ _OF_SURVEYS = {  # sheets of what a wall was surveyed with, by the part of the r
     "clouds": clouds_sheet,
     "liquid": liquid_sheet,
     "radii": radii_sheet,
+    "ship": ship_sheet,
 }
 _SHOWN_OF_SURVEY = ("adjustment", "points", "provenance")
 

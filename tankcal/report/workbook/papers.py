@@ -1,7 +1,17 @@
 """The working papers: courses, corrections, choices and provenance."""
 
-from tankcal.report.tables import clouds, hits, lines, liquid, radii, strapping, tangents, tank
-from tankcal.report.workbook.look import number_format
+from tankcal.report.tables import (
+    clouds,
+    hits,
+    lines,
+    liquid,
+    radii,
+    ship,
+    strapping,
+    tangents,
+    tank,
+)
+from tankcal.report.workbook.look import Column, number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
 
@@ -111,6 +121,32 @@ def radii_sheet(book, record):
     heading = book.word("headings.radii")
     columns = columns_of(book, radii.RADII)
     write_tables(book, sheet, _HEAD_ROW, [(heading, "radii", columns)])
+
+
+def ship_sheet(book, record):
+    """Corrections for trim and list: where the pipe ends to tell, and a matrix for each list."""
+    sheet = book.sheet("ship", book.word("texts.ship_subtitle"), landscape=True)
+    tables = [(book.word("headings.ship_cells"), "ship_cells", columns_of(book, ship.CELLS))]
+    for number, (list_deg, cells) in enumerate(ship.by_list(record), 1):
+        title = book.word("texts.ship_list", list=f"{list_deg:g}")
+        tables.append((title, f"ship_list_{number}", _corrections(book, record, cells)))
+    write_tables(book, sheet, _HEAD_ROW, tables)
+
+
+def _corrections(book, record, cells):
+    """Soundings, the correction at each trim (or why there is none), the largest U of each row."""
+    soundings, words = record["ship"]["sounding_m"], book.words["table_headings"]
+    columns = [Column(f"{words['ship_sounding_m']}, m", soundings, 3, 12)]
+    for cell in cells:
+        values = [
+            book.paper.word(f"ship_states.{state}") if state else 1000 * correction
+            for state, correction in zip(cell["state"], cell["correction_m"], strict=True)
+        ]
+        heading = book.paper.word("texts.ship_trim", trim=f"{cell['trim_m']:g}")
+        columns.append(Column(f"{heading}, mm", values, 1, 14))
+    spread = [ship.largest_U_m(cells, place) for place in range(len(soundings))]
+    in_mm = [None if U is None else 1000 * U for U in spread]
+    return [*columns, Column(f"{words['ship_U']}, mm", in_mm, 1, 14)]
 
 
 def corrections_sheet(book, record):

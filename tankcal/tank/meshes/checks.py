@@ -279,7 +279,7 @@ def _depths(vertices, faces, label, bodies, name):
         if len(near) == 0:
             continue
         probes = near[np.linspace(0, len(near) - 1, min(some, len(near))).astype(int)]
-        turns = np.abs(_windings(own[i][probes], vertices[groups[j]]))
+        turns = np.abs(windings(own[i][probes], vertices[groups[j]]))
         inside = np.any(turns > 1 - ON_SURFACE)
         outside = np.any(turns < ON_SURFACE) or len(near) < len(own[i])
         if inside and outside:
@@ -328,7 +328,13 @@ def _probes(pairs, vertices, faces, name):
     )
 
 
-def _windings(points, corners):
+def holds(mesh, point_m):
+    """Whether a point lies inside a `Mesh`, or on its surface."""
+    corners = mesh.vertices_m[mesh.faces]
+    return bool(windings(np.asarray(point_m, dtype=float)[None], corners)[0] > ON_SURFACE)
+
+
+def windings(points, corners):
     """(n,) how often a closed surface (m, 3, 3) goes round points (n, 3).
 
     Source: van Oosterom & Strackee 1983. A face that the point lies on counts nothing: on a surface

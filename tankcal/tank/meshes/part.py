@@ -68,6 +68,11 @@ class MeshPart(Part):
     surface_m2: np.ndarray
 
     @property
+    def face_count(self):
+        """Number of triangles."""
+        return len(self.plan_m2)
+
+    @property
     def top_m(self):
         """The highest level."""
         return self.height_m - self.zero_m
@@ -174,12 +179,51 @@ def sums_below(corners, weights, heights, power, side="left"):
         offset += np.bincount(second, weights=weight * z.sum(axis=0) / 3, minlength=len(slope))
         tall = np.where(z[2] > z[0], z[2] - z[0], 1.0)
         share = weight / tall / (3.0 if power == 3 else 1.0)
-        tree.add(first, second, z[0], z[1] - z[0], share)
-        tree.add(second, third, z[2], z[1] - z[2], share if power == 3 else -share)
+        low, high = z[1] - z[0], z[1] - z[2]
+        tree.add(first, second, z[0], low, {power: share * low ** (power - 1)})
+        tree.add(second, third, z[2], high, {power: share * high ** (power - 1)})
     below = slope.cumsum()[:-1]
     if power == 3:
         below = rows * below - offset.cumsum()[:-1]
-    return (below + tree.values())[inverse]
+    return (below + tree.values()[0])[inverse]
+
+
+def moments_below(corners, values, weights, heights, side="left"):
+    """(rows, c) sums over faces of weight times the mean, over the part below each height, of
+    functions that are linear on each face; where a face is dry it counts nothing.
+
+    With f0, f1, f2 the values at the ascending corners, T their height, r = z1 - z0 and
+    u = (h - z0) / r, the mean up to the middle corner is
+
+        r / T u^2 (f0 + u ((f1 - f0) + r / T (f2 - f0)) / 3),
+
+    the whole less the same of the part above from the other end, beyond it.
+
+    values  (m, 3, c) at the corners; corners, heights and side as in `sums_below`
+    """
+    rows, inverse = np.unique(heights, return_inverse=True)
+    columns = values.shape[2]
+    tree, whole = _Tree(rows, 3, columns), np.zeros((len(rows) + 1, columns))
+    for start in range(0, len(weights), BLOCK):
+        z = corners[start : start + BLOCK].T
+        f = np.moveaxis(values[start : start + BLOCK], 0, 2)
+        weight = weights[start : start + BLOCK]
+        first, second, third = (np.searchsorted(rows, z[i], side=side) for i in range(3))
+        for column, mean in enumerate(f.mean(axis=0)):
+            whole[:, column] += np.bincount(second, weights=weight * mean, minlength=len(whole))
+        tall = np.where(z[2] > z[0], z[2] - z[0], 1.0)
+        tree.add(first, second, z[0], z[1] - z[0], _cut_corner(f, weight, (z[1] - z[0]) / tall))
+        of_top = _cut_corner(f[::-1], -weight, (z[2] - z[1]) / tall)
+        tree.add(second, third, z[2], z[1] - z[2], of_top)
+    return (whole.cumsum(axis=0)[:-1] + tree.values().T)[inverse]
+
+
+def _cut_corner(f, weight, share):
+    """{power of u: (c, m)} of the part cut off corner 0; share: of the height up to corner 1."""
+    return {
+        2: weight * share * f[0],
+        3: weight * share * ((f[1] - f[0]) + share * (f[2] - f[0])) / 3,
+    }
 
 
 class _Tree:
@@ -188,8 +232,7 @@ class _Tree:
     Node 1 holds all heights, nodes 2 i and 2 i + 1 the halves of node i, the last row one each.
     """
 
-    def __init__(self, heights, power):
-        self.power = power
+    def __init__(self, heights, power, columns=1):
         self.heights = heights
         self.depth = max(int(np.ceil(np.log2(max(len(heights), 1)))), 0)
         self.leaves = 1 << self.depth
@@ -201,35 +244,45 @@ class _Tree:
             low[nodes], high[nodes] = blocks[:, 0], blocks[:, -1]
         low[0], high[0] = 0.0, 0.0
         self.middle, self.half = (low + high) / 2, (high - low) / 2
-        self.coefficients = np.zeros((power + 1, 2 * self.leaves))
+        self.coefficients = np.zeros((power + 1, columns, 2 * self.leaves))
 
-    def add(self, start, stop, foot, reach, share):
-        """Add share |reach|^(power - 1) ((h - foot) / reach)^power to heights[start:stop]."""
+    def add(self, start, stop, foot, reach, amounts):
+        """Add the sum of amounts[p] ((h - foot) / reach)^p to heights[start:stop].
+
+        amounts  {power: (m,) or (columns, m)}
+        """
         some = np.flatnonzero(start < stop)
         left, right = start[some] + self.leaves, stop[some] + self.leaves
-        foot, reach, share = foot[some], reach[some], share[some]
-        share = share * np.abs(reach) ** (self.power - 1)
         while len(left):
             odd = (left & 1).astype(bool)
-            self._store(left[odd], foot[odd], reach[odd], share[odd])
+            self._store(left[odd], some[odd], foot, reach, amounts)
             left = left + odd
             odd = (right & 1).astype(bool)
             right = right - odd
-            self._store(right[odd], foot[odd], reach[odd], share[odd])
+            self._store(right[odd], some[odd], foot, reach, amounts)
             left, right = left >> 1, right >> 1
             open_ = left < right
-            left, right = left[open_], right[open_]
-            foot, reach, share = foot[open_], reach[open_], share[open_]
+            left, right, some = left[open_], right[open_], some[open_]
 
-    def _store(self, nodes, foot, reach, share):
-        at_middle, step = (self.middle[nodes] - foot) / reach, self.half[nodes] / reach
-        for k in range(self.power + 1):
-            term = share * comb(self.power, k) * at_middle ** (self.power - k) * step**k
-            self.coefficients[k] += np.bincount(nodes, weights=term, minlength=2 * self.leaves)
+    def _store(self, nodes, some, foot, reach, amounts):
+        at_middle = (self.middle[nodes] - foot[some]) / reach[some]
+        step = self.half[nodes] / reach[some]
+        of_middle, of_step = [np.ones_like(step)], [np.ones_like(step)]
+        for _ in range(max(amounts)):  # products, for powers of arrays are slow
+            of_middle.append(of_middle[-1] * at_middle)
+            of_step.append(of_step[-1] * step)
+        for power, amount in amounts.items():
+            own = np.atleast_2d(amount)[:, some]
+            for k in range(power + 1):
+                terms = own * (comb(power, k) * of_middle[power - k] * of_step[k])
+                for column, term in enumerate(terms):
+                    self.coefficients[k, column] += np.bincount(
+                        nodes, weights=term, minlength=2 * self.leaves
+                    )
 
     def values(self):
-        """(len(heights),) sum of all that was added, at each height."""
-        total = np.zeros(len(self.heights))
+        """(columns, len(heights)) sum of all that was added, at each height."""
+        total = np.zeros((self.coefficients.shape[1], len(self.heights)))
         leaves = np.arange(len(self.heights)) + self.leaves
         for level in range(self.depth + 1):
             nodes = leaves >> level
@@ -239,6 +292,6 @@ class _Tree:
             )
             part = np.zeros_like(total)
             for row in self.coefficients[::-1]:
-                part = part * t + row[nodes]
+                part = part * t + row[:, nodes]
             total += part
         return total

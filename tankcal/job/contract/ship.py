@@ -1,0 +1,209 @@
+"""[ship]: its keys; marks, trims, lists and a sounding pipe of a tank of a ship or barge."""
+
+from itertools import product
+from math import hypot, radians, tan
+
+import numpy as np
+
+from tankcal.job.checking import has_rows, is_not_given, missing_beside, tell
+from tankcal.job.contract.shorthand import number, positive
+from tankcal.job.fields import Field
+from tankcal.messages import message
+from tankcal.tank.ships import Pipe, in_ship_frame
+
+MESH_ONLY = ("mesh",)
+BOW_DEG = 90.0  # the bow is towards +x where nothing else is said
+
+
+def _several(name, note, high):
+    return Field(name, "numbers", note, low=-high, high=high, kinds=MESH_ONLY)
+
+
+KEYS = (
+    _several(
+        "trim_m",
+        "trims that corrections are tabled for, draught aft less draught forward, metres; negative:"
+        " by the bow; blank, as all of [ship]: not a tank of a ship",
+        30,
+    ),
+    positive(
+        "length_between_marks_m",
+        "distance fore and aft between the draught marks, metres",
+        600,
+        kinds=MESH_ONLY,
+    ),
+    _several(
+        "list_deg",
+        "lists that corrections are tabled for, degrees; to starboard positive, to port negative",
+        45,
+    ),
+    number(
+        "bow_azimuth_deg",
+        "direction of the bow in the frame of the mesh, degrees clockwise from +y; blank: 90, +x",
+        0,
+        360,
+        kinds=MESH_ONLY,
+    ),
+    _several(
+        "pipe_top_m",
+        "upper end of the sounding pipe: x; y; z in the frame of the mesh, metres",
+        1e8,
+    ),
+    _several(
+        "pipe_bottom_m",
+        "lower end of the sounding pipe, which soundings count from: x; y; z in the frame of the"
+        " mesh, metres",
+        1e8,
+    ),
+    positive(
+        "correction_step_m",
+        "step of the soundings that corrections are tabled for, metres; blank: chosen, about a"
+        " hundred soundings",
+        10,
+        kinds=MESH_ONLY,
+    ),
+    number(
+        "contraction_percent",
+        "how much all lengths of the tank are shorter in service than as measured, percent, the"
+        " same everywhere; blank: not at all",
+        -1,
+        2,
+        kinds=MESH_ONLY,
+    ),
+)
+
+NEEDED = ("trim_m", "length_between_marks_m", "list_deg", "pipe_top_m", "pipe_bottom_m")
+ENDS = ("pipe_top_m", "pipe_bottom_m")
+STEEPEST_TRIM = 0.2  # tangent: beyond, draughts and marks are not in one unit
+LEAST_RISE = 0.2  # of the surface for each metre of pipe: a flatter one cannot be sounded
+MOST_CELLS = 400  # trims times lists
+
+
+def is_ship(values):
+    """Is it a tank of a ship, by what could be read of [ship]?"""
+    return any(values["ship"][name] is not None for name in NEEDED)
+
+
+def check_ship(values, tables, raw, log):
+    """All that is needed or nothing, credible trims, a pipe that stands upright at all of them."""
+    given = [field.name for field in KEYS if not is_not_given(raw, "ship", field.name)]
+    if not given:
+        return
+
+    def refuse(key, expected, section="ship"):
+        tell(log.problem, raw, section, key, expected)
+
+    for name in NEEDED:
+        if name not in given:
+            refuse(name, missing_beside(f"ship.{given[0]}"))
+    ship = values["ship"]
+    _check_grid(ship, refuse)
+    _check_pipe(ship, refuse)
+    _refuse_others(values, tables, log, refuse)
+
+
+def _check_grid(ship, refuse):
+    length = ship["length_between_marks_m"]
+    for name in ("trim_m", "list_deg"):
+        found = ship[name] or ()
+        if len(set(found)) < len(found):
+            refuse(name, message("ship_grid_twice", "a value is given twice; expected each once"))
+    if length is not None and ship["trim_m"]:
+        steepest = max(ship["trim_m"], key=abs)
+        if abs(steepest) > STEEPEST_TRIM * length:
+            expected = message(
+                "ship_trim_steep",
+                "found {trim:g}; expected at most {most:g} m over {length:g} m between the marks: "
+                "is one in another unit?",
+                trim=steepest,
+                most=STEEPEST_TRIM * length,
+                length=length,
+            )
+            refuse("trim_m", expected)
+    count = len(ship["trim_m"] or ()) * len(ship["list_deg"] or ())
+    if count > MOST_CELLS:
+        expected = message(
+            "ship_grid_large",
+            "{count} pairs of trim and list; expected at most {most}",
+            count=count,
+            most=MOST_CELLS,
+        )
+        refuse("trim_m", expected)
+
+
+def _check_pipe(ship, refuse):
+    for name in ENDS:
+        if ship[name] is not None and len(ship[name]) != 3:
+            expected = message(
+                "ship_pipe_not_xyz",
+                "{count} numbers; expected the three of a place: x; y; z",
+                count=len(ship[name]),
+            )
+            refuse(name, expected)
+    if any(ship[name] is None or len(ship[name]) != 3 for name in ENDS):
+        return
+    top, bottom = ship["pipe_top_m"], ship["pipe_bottom_m"]
+    if not top[2] > bottom[2]:
+        expected = message(
+            "ship_pipe_upside_down",
+            "found z = {top:g}; expected above the lower end, z = {bottom:g}: is the pipe upside "
+            "down?",
+            top=top[2],
+            bottom=bottom[2],
+        )
+        refuse("pipe_top_m", expected)
+    elif None not in (ship["length_between_marks_m"], ship["trim_m"], ship["list_deg"]):
+        _check_rise(ship, refuse)
+
+
+def _check_rise(ship, refuse):
+    """Rising enough at all pairs; a pipe that does not at even keel is told alone."""
+    bow = BOW_DEG if ship["bow_azimuth_deg"] is None else ship["bow_azimuth_deg"]
+    ends = in_ship_frame([ship["pipe_bottom_m"], ship["pipe_top_m"]], radians(bow))
+    pipe = Pipe(*np.asarray(ends))
+    trims = (0.0, *(trim / ship["length_between_marks_m"] for trim in ship["trim_m"]))
+    lists = (0.0, *(tan(radians(one)) for one in ship["list_deg"]))
+    for trim, list_ in product(trims, lists):
+        rise = pipe.rise(trim, list_) / hypot(1.0, trim, list_)
+        if rise < LEAST_RISE:
+            expected = message(
+                "ship_pipe_flat",
+                "the pipe rises {rise:.3g} m for each metre at trim {trim:g} m and list {list:g} "
+                "degrees; expected at least {least:g}",
+                rise=rise,
+                trim=trim * ship["length_between_marks_m"],
+                list=np.degrees(np.arctan(list_)),
+                least=LEAST_RISE,
+            )
+            refuse("pipe_top_m", expected)
+            return
+
+
+def _refuse_others(values, tables, log, refuse):
+    """What has no place beside a pipe: another zero, things between dips, a second temperature."""
+    if values["datum"]["dip_plate_z_m"] is not None:
+        expected = message(
+            "ship_dip_plate",
+            "given beside [ship]; expected a blank: soundings count from ship.pipe_bottom_m",
+        )
+        refuse("dip_plate_z_m", expected, "datum")
+    if has_rows(tables["deadwood"]):
+        expected = message(
+            "ship_deadwood",
+            "given beside [ship]; expected what stands in the tank as a hollow of the mesh: of "
+            "deadwood by dips nobody knows where it is",
+        )
+        log.problem(tables["deadwood"].file, expected)
+    if has_rows(tables["liquid"]):
+        expected = message(
+            "ship_liquid", "given beside [ship]; expected only one of them: runs know no pipe"
+        )
+        log.problem(tables["liquid"].file, expected)
+    contracted = values["ship"]["contraction_percent"] is not None
+    if contracted and values["survey"]["shell_temperature_c"] is not None:
+        expected = message(
+            "ship_contraction_twice",
+            "given beside survey.shell_temperature_c; expected only one of them: both shorten the "
+            "tank",
+        )
+        refuse("contraction_percent", expected)

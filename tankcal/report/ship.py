@@ -1,0 +1,67 @@
+"""A tank of a ship on paper: her pipe, and tables of corrections for trim and list."""
+
+from tankcal.report import blocks
+from tankcal.report.tables import ship as tables
+from tankcal.text.digits import decimals_of_rows, fixed
+
+ACROSS = 8  # trims beside each other on a page
+DECIMALS = 1  # of a correction, mm
+
+
+def facts(paper):
+    """The pipe, the marks, the bow, a contraction, and how well corrections may be interpolated."""
+    ship = paper.record["ship"]
+    return paper.facts(
+        [
+            ("ship_marks", paper.number(ship["length_between_marks_m"], "m", decimals=2)),
+            ("ship_bow", paper.number(ship["bow_azimuth_deg"], "deg", decimals=1)),
+            ("ship_pipe_bottom", _place(paper, ship["pipe_bottom_m"])),
+            ("ship_pipe_top", _place(paper, ship["pipe_top_m"])),
+            ("ship_contraction", paper.number(ship["contraction_percent"], "percent", digits=3)),
+            ("ship_interpolated", paper.number(ship["interpolated_m"], "mm", decimals=DECIMALS)),
+        ]
+    )
+
+
+def _place(paper, xyz):
+    return "; ".join(paper.number(one, "m", decimals=3) for one in xyz)
+
+
+def corrections(paper):
+    """A matrix for each list, so many trims wide: corrections and the largest U of each row."""
+    found = []
+    for list_deg, cells in tables.by_list(paper.record):
+        for start in range(0, len(cells), ACROSS):
+            found.append(_matrix(paper, list_deg, cells[start : start + ACROSS]))
+    return found
+
+
+def _matrix(paper, list_deg, cells):
+    soundings = paper.record["ship"]["sounding_m"]
+    places = range(len(soundings))
+    heads = [[paper.word("table_headings.ship_sounding_m"), "m"]]
+    columns = [[paper.number(one, decimals=3) for one in soundings]]
+    for cell in cells:
+        trim = paper.number(cell["trim_m"], decimals=2)
+        heads.append([paper.word("texts.ship_trim", trim=trim), "mm"])
+        columns.append([_correction(paper, cell, place) for place in places])
+    spread = [tables.largest_U_m(cells, place) for place in places]
+    in_mm = [None if U is None else 1000 * U for U in spread]
+    digits = decimals_of_rows([U or 0.0 for U in in_mm], least=0)
+    heads.append([paper.word("table_headings.ship_U"), "mm"])
+    columns.append(
+        [
+            None if U is None else fixed(U, decimals, paper.marks)
+            for U, decimals in zip(in_mm, digits, strict=True)
+        ]
+    )
+    rows = [list(row) for row in zip(*columns, strict=True)]
+    caption = paper.word("captions.ship_matrix", list=paper.number(list_deg, "deg", decimals=2))
+    align = ["decimal"] * len(heads)
+    return blocks.table(heads, rows, caption, align, paper.marks.decimal)
+
+
+def _correction(paper, cell, place):
+    if cell["state"][place]:
+        return paper.word(f"ship_states.{cell['state'][place]}")
+    return paper.number(1000 * cell["correction_m"][place], decimals=DECIMALS)
