@@ -1,6 +1,7 @@
 """A tank of one solid: lying cylinder, sphere or mesh, from its sizes or its points."""
 
 from dataclasses import replace
+from functools import partial
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
@@ -20,18 +21,15 @@ from tankcal.tank.solids import LyingTank, Sphere
 
 def solid_body(job, survey, switches, heel=(0.0, 0.0)):
     """The `Body` of a solid; heel: tangents of trim and list of a tank of a ship."""
-    if job.rings:
-        part = ringed_part(job, survey, switches)
-    else:
-        part = _part(job, survey, switches, heel)
-    parts, zero = [part], solid_zero(job)
+    part_of = ringed_part if job.rings else partial(_part, heel=heel)
+    parts, zero = [part_of(job, survey, switches)], solid_zero(job)
     if switches.deadwood and job.deadwood:
         parts.append(deadwood_part(job.deadwood, zero))
     return Body(
         tuple(parts),
         job.inputs,
         lowest_m=0.0,
-        highest_m=part.top_m,
+        highest_m=parts[0].top_m,
         correlations=job.correlations,
         estimates=estimates_of(sized_job(job, survey)),
     )
