@@ -145,8 +145,7 @@ def wall_shape_of(job, wall):
         tuple(Plumb(plumbed[0], high, part) for high, part in plumbs),
         found.part(-3, len(found.value_m)) if axis else None,
         tuple(
-            Plumb(*pair, part)
-            for pair, part in zip(pairs, parts[len(plumbed[1:]) :], strict=True)
+            Plumb(*pair, part) for pair, part in zip(pairs, parts[len(plumbed[1:]) :], strict=True)
         ),
     )
 

@@ -22,6 +22,7 @@ from tankcal.record.schema import Saved, filled_from, key
 from tankcal.record.strapping import StrappingRecord, strapping_of
 from tankcal.record.tangents import TangentsRecord, tangents_of
 from tankcal.record.versions import FORMAT
+from tankcal.record.wall_shape import WallShapeRecord, shape_record
 from tankcal.tank.deliveries import WorstDeliveries
 
 
@@ -81,6 +82,11 @@ class Record(Saved, kw_only=True):
         "radii out of a former table; left out where there are none", default=None, optional=True
     )
     courses: list[survey.CourseOfShell] = key("from the bottom up", default=())
+    wall_shape: WallShapeRecord | None = key(
+        "for inspections; left out where no upright wall was surveyed by points",
+        default=None,
+        optional=True,
+    )
     capacity: table.CapacityTable | None = key("the table", default=None)
     interpolation: table.InterpolationError | None = key("between rows", default=None)
     proportional_parts: table.PartsOfRows | None = key("of millimetres", default=None)
@@ -123,6 +129,7 @@ def record_of(result):
             liquid=liquid_of(result),
             radii=radii_of(result),
             courses=survey.courses_of(result),
+            wall_shape=shape_record(job, result.wall),
             capacity=table.capacity_of(result),
             interpolation=filled_from(table.InterpolationError, result.straightness),
             proportional_parts=table.proportional_parts_of(result),
