@@ -20,6 +20,9 @@ WALL_CHECKS = (
 )  # fmt: skip
 
 
+LEAST_READ = 8  # generatrices with a reading at both ends, that others are left out for
+
+
 @dataclass(frozen=True)
 class Sizes:
     """Sizes of a tank that its wall is judged by.
@@ -162,7 +165,7 @@ def _generatrix(shape, sizes, rule):
     if not shape["plumbs"]:
         return _undetermined("plumbness_generatrix", limit, "one_level")
     top = shape["plumbs"][-1]
-    return _of_plumb("plumbness_generatrix", top, sizes.height_m, shape["azimuth_deg"], limit)
+    return _of_plumb("plumbness_generatrix", top, sizes.height_m, limit)
 
 
 def _courses(shape, sizes, rule):
@@ -171,9 +174,7 @@ def _courses(shape, sizes, rule):
     for one in shape["courses"]:
         limit = _limit(rule, "plumbness_course", sizes, one["course"])
         height = sizes.courses_m[one["course"] - 1]
-        found.append(
-            _of_plumb("plumbness_course", one, height, shape["azimuth_deg"], limit, one["course"])
-        )
+        found.append(_of_plumb("plumbness_course", one, height, limit, one["course"]))
     if not found:
         return _undetermined("plumbness_course", None, "one_level_a_course")
     used = sum(one.used for one in found)
@@ -189,9 +190,14 @@ def _closeness(figure):
     return (1, size / limit) if size > limit else (0, (size + figure.U) / limit)
 
 
-def _of_plumb(code, plumb, height_m, azimuth_deg, limit, course=None):
+def _of_plumb(code, plumb, height_m, limit, course=None):
     over = plumb["high_m"] - plumb["low_m"]
-    found = spread_of(plumb["departure_mm"], plumb["u_mm"], plumb["dof"]).times(height_m / over)
+    chosen = np.array(plumb["is_read"], dtype=bool)
+    if np.count_nonzero(chosen) < LEAST_READ:  # else what a level does between readings is no part
+        chosen[:] = True
+    rows = [[plumb[name][i] for i in np.flatnonzero(chosen)]
+            for name in ("azimuth_deg", "departure_mm", "u_mm", "dof")]  # fmt: skip
+    azimuth_deg, found = rows[0], spread_of(*rows[1:]).times(height_m / over)
     place = deciding_place(found.value, found.U, limit and limit.value)
     return Figure(
         code=code,
@@ -232,9 +238,10 @@ def _generatrices(shape):
     low = shape["plumbs"][0]["low_m"]
     rows = [spread_of(one["departure_mm"], one["u_mm"], one["dof"]) for one in shape["plumbs"]]
     heights = [low, *(one["high_m"] for one in shape["plumbs"])]
-    nothing = np.zeros(len(shape["azimuth_deg"]))
+    azimuth = shape["plumbs"][0]["azimuth_deg"]
+    nothing = np.zeros(len(azimuth))
     return Generatrices(
-        azimuth_deg=[one % 360 for one in shape["azimuth_deg"]],
+        azimuth_deg=[one % 360 for one in azimuth],
         height_m=heights,
         course=[of_height[one] for one in heights],
         departure_mm=[nothing, *(one.value for one in rows)],

@@ -9,7 +9,7 @@ c the centres of the levels. All with one covariance, by what the survey leaves 
 what it did not see of the wall, so that plates, offsets and scales drop out of differences.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,10 +22,12 @@ from tankcal.pipeline.wall import Wall
 from tankcal.tank.hydrostatics import LiquidHead
 from tankcal.uncertainty import Source, combine, declared_source, group_correlated
 
+SAME_PLACE_M = 0.1  # along the arc: a reading as near as that to a generatrix is on it
 LOW_M = 0.3048  # a foot above the bottom weld, where the low radii are judged
 SAME_LEVEL_M = 0.05  # a level as near as that to another is the same
 MOST_AZIMUTHS, EVEN_AZIMUTHS = 72, 36  # of a level as measured; of one with more points
 LEAST_HEIGHT = 0.2  # of a course: levels nearer than that tell nothing of its plumb
+NEAR_M = 0.1  # from the wall: what stands there may be a dent
 LEAST_U_M = 1e-9  # of a value: rounding
 
 
@@ -42,8 +44,11 @@ class Level:
     zeta : float
         Height within its course, -1 to 1.
     azimuth_rad : ndarray, shape (a,)
+        Ascending: of its readings where they are level.
     ring : int
         Of the field; -1: no points have this height, and its centre is not known.
+    site : ndarray of int, shape (a,)
+        Reading of the field at each azimuth; -1: the radius there is estimated.
     is_low : bool
         Whether it is the one whose low radii are judged.
     """
@@ -53,6 +58,7 @@ class Level:
     zeta: float
     azimuth_rad: np.ndarray
     ring: int
+    site: np.ndarray
     is_low: bool = False
 
 
@@ -75,11 +81,37 @@ class Plumb:
 
     low, high : int
         Which of the levels of the `WallShape`.
+    azimuth_rad : ndarray, shape (g,)
+    is_read : ndarray of bool, shape (g,)
+        Whether there is a reading at both ends; else at least one end is estimated by its
+        neighbours.
     """
 
     low: int
     high: int
+    azimuth_rad: np.ndarray
+    is_read: np.ndarray
     figures: Figures
+
+
+@dataclass(frozen=True)
+class SetAside:
+    """A point near the wall that was not taken for it: of a fitting, a slip, or a dent.
+
+    Attributes
+    ----------
+    point : str
+        Name.
+    height_m, azimuth_rad : float
+        Where: above the bottom of the shell, about the axis.
+    residual_m : float
+        Outwards from the wall as all other points show it.
+    """
+
+    point: str
+    height_m: float
+    azimuth_rad: float
+    residual_m: float
 
 
 @dataclass(frozen=True)
@@ -88,6 +120,8 @@ class WallShape:
 
     Attributes
     ----------
+    set_aside : tuple of SetAside
+        Points near the wall that were not taken for it.
     state : str
         "as_found": loaded as it was surveyed; "unloaded": the head of the survey's liquid taken
         off.
@@ -97,8 +131,6 @@ class WallShape:
         Of each level at its azimuths: inside, about its own centre.
     centres_m : tuple
         (x, y) of each level in the frame of the survey; None where it is not known.
-    azimuth_rad : ndarray, shape (g,)
-        Of the generatrices.
     plumbs : tuple of Plumb
         Of each level with a centre against the lowest of these; (): fewer than two.
     axis : Figures or None
@@ -107,11 +139,11 @@ class WallShape:
         Of each course with two levels far enough apart, its highest against its lowest.
     """
 
+    set_aside: tuple[SetAside, ...]
     state: str
     levels: tuple[Level, ...]
     radii: tuple[Figures, ...]
     centres_m: tuple
-    azimuth_rad: np.ndarray
     plumbs: tuple[Plumb, ...]
     axis: Figures | None
     courses: tuple[Plumb, ...]
@@ -123,81 +155,102 @@ def wall_shape_of(job, wall):
         return None
     levels = _levels(job, wall)
     plumbed = [i for i, one in enumerate(levels) if _has_centre(wall, one)]
-    azimuth = _generatrices(levels, plumbed)
-    base = _Base(job, wall, levels, plumbed, azimuth)
-    ends = np.cumsum([0, *(len(one.azimuth_rad) for one in levels)])
+    pairs = [(plumbed[0], one) for one in plumbed[1:]]
+    of_courses = _pairs_of_courses(wall, levels, plumbed)
+    base = _Base(job, wall, levels, plumbed, (*pairs, *of_courses))
     rows = [base.radii(i, one.azimuth_rad) for i, one in enumerate(levels)]
-    rows += [base.plumb(plumbed[0], i, azimuth) for i in plumbed[1:]]
-    pairs = _pairs_of_courses(wall, levels, plumbed)
-    rows += [base.plumb(low, high, azimuth) for low, high in pairs]
-    axis = [] if len(plumbed) < 2 else [base.axis(plumbed[0], plumbed[-1])]
-    found = base.figures(np.vstack(rows + axis))
-    start, count = ends[-1], len(azimuth)
-    parts = [found.part(start + i * count, start + (i + 1) * count)
-             for i in range(len(plumbed[1:]) + len(pairs))]  # fmt: skip
-    plumbs = zip(plumbed[1:], parts, strict=False)
+    rows += [base.plumb(*pair) for pair in (*pairs, *of_courses)]
+    if pairs:
+        rows.append(base.axis(*pairs[-1]))
+    whole = base.figures(np.vstack(rows))
+    ends = np.cumsum([0, *map(len, rows)])
+    found = [whole.part(*pair) for pair in zip(ends[:-1], ends[1:], strict=True)]
+    radii, others = found[: len(levels)], found[len(levels) :]
+    plumbs = [
+        Plumb(low, high, levels[low].azimuth_rad, base.is_read(low, high), part)
+        for (low, high), part in zip((*pairs, *of_courses), others, strict=False)
+    ]
     return WallShape(
+        tuple(_set_aside(job, wall)),
         base.state,
         levels,
-        tuple(found.part(*pair) for pair in zip(ends[:-1], ends[1:], strict=True)),
+        tuple(radii),
         tuple(base.centre(i) if i in plumbed else None for i in range(len(levels))),
-        azimuth,
-        tuple(Plumb(plumbed[0], high, part) for high, part in plumbs),
-        found.part(-3, len(found.value_m)) if axis else None,
-        tuple(
-            Plumb(*pair, part) for pair, part in zip(pairs, parts[len(plumbed[1:]) :], strict=True)
-        ),
+        tuple(plumbs[: len(pairs)]),
+        others[-1] if pairs else None,
+        tuple(plumbs[len(pairs) :]),
     )
+
+
+def _set_aside(job, wall):
+    """Points near the wall that were not taken for it."""
+    shell, xyz = wall.shell, job.points.xyz_m
+    near = (shell.reason != "") & (np.abs(shell.residual_m) <= NEAR_M)
+    for i in np.flatnonzero(near):
+        axis = np.array(shell.axis_m) + (xyz[i, 2] - shell.z_m) * np.array(shell.slope)
+        x, y = xyz[i, :2] - axis
+        yield SetAside(
+            job.points.names[i],
+            float(xyz[i, 2] - job.datum.bottom_z_m),
+            float(np.arctan2(x, y) % FULL_TURN),
+            float(shell.residual_m[i]),
+        )
 
 
 def _levels(job, wall):
     """Levels of the sections, and the low one; a section that is not level has two."""
     found = []
     for ring, section in enumerate(wall.sections):
-        group = section.group
+        group, chosen = section.group, _readings_of(wall.field.sites, ring)
+        azimuth = wall.field.sites.azimuth_rad[chosen] % FULL_TURN
+        if group.degree == 0:
+            height, zeta = group.height_m, float(group.zeta(group.height_m))
+            found.append(Level(height, group.course, zeta, azimuth, ring, chosen))
+            continue
         points = wall.accepted[group.members]
-        height = job.points.xyz_m[points, 2] - job.datum.bottom_z_m
-        azimuth = _azimuths(section, job.points.xyz_m[points], wall, job)
-        heights = [group.height_m]
-        if group.degree > 0:
-            heights = np.quantile(height, [0.1, 0.9]).tolist()
-        found += [
-            Level(one, group.course, float(group.zeta(one)), azimuth, ring) for one in heights
-        ]
+        heights = job.points.xyz_m[points, 2] - job.datum.bottom_z_m
+        for one in np.quantile(heights, [0.1, 0.9]).tolist():
+            zeta = float(group.zeta(one))
+            found.append(Level(one, group.course, zeta, azimuth, ring, np.full(len(chosen), -1)))
     found.sort(key=lambda one: one.height_m)
-    nearest = min(range(len(found)), key=lambda i: abs(found[i].height_m - LOW_M))
-    one = found[nearest]
-    if abs(one.height_m - LOW_M) <= SAME_LEVEL_M:
-        found[nearest] = Level(
-            one.height_m, one.course, one.zeta, one.azimuth_rad, one.ring, is_low=True
+    return _with_low(found, wall.joints_m[1])
+
+
+def _with_low(levels, top_m):
+    """The levels with the low one marked, or added where none is near; first course to top_m."""
+    place = min(range(len(levels)), key=lambda i: abs(levels[i].height_m - LOW_M))
+    nearest = levels[place]
+    if abs(nearest.height_m - LOW_M) <= SAME_LEVEL_M:
+        levels[place] = replace(nearest, is_low=True)
+    elif top_m > LOW_M:
+        low = replace(
+            levels[0],
+            height_m=LOW_M,
+            course=0,
+            zeta=2 * LOW_M / top_m - 1,
+            ring=-1,
+            site=np.full(len(levels[0].site), -1),
+            is_low=True,
         )
-        return tuple(found)
-    top = wall.joints_m[1]
-    if top > LOW_M:
-        lowest = next(one for one in found if one.course == 0) if found[0].course == 0 else found[0]
-        low = Level(LOW_M, 0, 2 * LOW_M / top - 1, lowest.azimuth_rad, -1, is_low=True)
-        found = sorted([*found, low], key=lambda one: one.height_m)
-    return tuple(found)
+        levels = sorted([*levels, low], key=lambda one: one.height_m)
+    return tuple(levels)
 
 
-def _azimuths(section, xyz_m, wall, job):
-    """Those of the points of a section; even ones where there are many."""
-    group, circle = section.group, section.circle
-    if len(xyz_m) > MOST_AZIMUTHS:
-        return np.arange(EVEN_AZIMUTHS) * FULL_TURN / EVEN_AZIMUTHS
-    above = xyz_m[:, 2] - job.datum.bottom_z_m - group.height_m
-    away = xyz_m[:, :2] - np.outer(above, wall.shell.slope) - (circle.x_m, circle.y_m)
-    return np.sort(np.arctan2(away[:, 0], away[:, 1]) % FULL_TURN)
+def _readings_of(sites, ring):
+    """Readings of a ring by azimuth; of many some that are about evenly spread."""
+    own = np.flatnonzero(sites.ring == ring)
+    azimuth = sites.azimuth_rad[own] % FULL_TURN
+    own = own[np.argsort(azimuth, kind="stable")]
+    if len(own) <= MOST_AZIMUTHS:
+        return own
+    even = np.arange(EVEN_AZIMUTHS) * FULL_TURN / EVEN_AZIMUTHS
+    away = np.abs((np.sort(azimuth)[:, None] - even + np.pi) % FULL_TURN - np.pi)
+    return own[np.unique(np.argmin(away, axis=0))]
 
 
 def _has_centre(wall, level):
     plumbed = wall.field.plumbed
     return level.ring >= 0 and (plumbed is None or level.ring < plumbed)
-
-
-def _generatrices(levels, plumbed):
-    """Azimuths along which the plumb is told: of the points of the lowest level."""
-    return levels[plumbed[0]].azimuth_rad if plumbed else np.zeros(0)
 
 
 def _pairs_of_courses(wall, levels, plumbed):
@@ -213,20 +266,26 @@ def _pairs_of_courses(wall, levels, plumbed):
 class _Base:
     """What all figures are sums of: radii at spots, then centres, with their uncertainty."""
 
-    def __init__(self, job, wall, levels, plumbed, azimuth):
+    def __init__(self, job, wall, levels, plumbed, pairs):
         self._job, self._wall, self._levels = job, wall, levels
-        self._place = {}
+        self._place, spots = {}, []
         for i, one in enumerate(levels):
-            angles = [*one.azimuth_rad, *(azimuth if i in plumbed else ())]
-            for angle in angles:
-                self._place.setdefault((i, float(angle)), len(self._place))
-        self._count = len(self._place)
+            for angle, site in zip(one.azimuth_rad, one.site, strict=True):
+                self._add(spots, i, angle, site)
+        for low, high in pairs:
+            for angle in levels[low].azimuth_rad:
+                self._add(spots, high, angle, self._reading_near(levels[high], angle))
+        self._count = len(spots)
         self._centre_of = {i: number for number, i in enumerate(plumbed)}
-        at = np.array([i for i, _ in self._place])
+        at, angle, site = map(np.array, zip(*spots, strict=True))
+        self._site = site
+        sites = wall.field.sites
+        zeta = np.array([one.zeta for one in levels])[at]
         spots = Spots(
             course=np.array([one.course for one in levels])[at],
-            zeta=np.array([one.zeta for one in levels])[at],
-            azimuth_rad=np.array([angle for _, angle in self._place]),
+            zeta=np.where(site >= 0, sites.zeta[site], zeta),
+            azimuth_rad=np.where(site >= 0, sites.azimuth_rad[site], angle),
+            site=site,
         )
         rings = [(levels[i].ring, levels[i].zeta) for i in plumbed]
         self._found = FieldValues(wall.field, spots, rings)
@@ -237,6 +296,19 @@ class _Base:
         self._value_m = self._surveyed.copy()
         self._value_m[: self._count] += self._head_m - inset
         self._sources = self._causes()
+
+    def _add(self, spots, level, angle, site):
+        """A spot of a level at an azimuth, once; as read where there is a reading."""
+        if (level, float(angle)) not in self._place:
+            self._place[level, float(angle)] = len(spots)
+            spots.append((level, float(angle), int(site)))
+
+    def _reading_near(self, level, angle):
+        """The reading of a level that is on a generatrix; -1: none."""
+        away = np.abs((level.azimuth_rad - angle + np.pi) % FULL_TURN - np.pi)
+        nearest = int(np.argmin(away))
+        is_near = away[nearest] * self._wall.field.nominal_m <= SAME_PLACE_M
+        return level.site[nearest] if is_near else -1
 
     def _widening(self):
         """(p,) what taking off the liquid of the survey adds to the radii, and the state."""
@@ -262,14 +334,21 @@ class _Base:
         found[np.arange(len(azimuth)), places] = 1.0
         return found
 
-    def plumb(self, low, high, azimuth):
+    def plumb(self, low, high):
         """(g, f) rows of the departures of one level from the plumb of another."""
+        azimuth = self._levels[low].azimuth_rad
         turn = np.column_stack([np.sin(azimuth), np.cos(azimuth)])
         found = self.radii(high, azimuth) - self.radii(low, azimuth)
         for level, sign in ((high, 1.0), (low, -1.0)):
             at = self._count + 2 * self._centre_of[level]
             found[:, at : at + 2] += sign * turn
         return found
+
+    def is_read(self, low, high):
+        """(g,) whether two levels have readings on the generatrices of the lower one."""
+        pairs = [[self._site[self._place[i, float(angle)]] for i in (low, high)]
+                 for angle in self._levels[low].azimuth_rad]  # fmt: skip
+        return np.all(np.array(pairs) >= 0, axis=1)
 
     def axis(self, low, high):
         """(3, f) rows of x and y between the centres of two levels, and along their direction."""

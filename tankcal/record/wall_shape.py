@@ -31,6 +31,8 @@ class ShapePlumb(Saved):
     course: int | None = key("from the bottom, 1 first; null: of more than one")
     low_m: Finite = key("height of the lower level above the bottom of the shell")
     high_m: Finite = key("height of the upper level")
+    azimuth_deg: list[Finite] = key("of each generatrix, clockwise from +y")
+    is_read: list[bool] = key("whether there is a reading at both ends; else one is estimated")
     departure_mm: list[Finite] = key("outwards positive")
     u_mm: list[Finite] = key("standard uncertainty")
     dof: list[float] = key("degrees of freedom; null: infinite")
@@ -47,13 +49,22 @@ class ShapeAxis(Saved):
     dof: float = key("degrees of freedom; null: infinite")
 
 
+class ShapeSetAside(Saved):
+    """A point near the wall that was not taken for it: of a fitting, a slip, or a dent."""
+
+    point: str = key("name")
+    height_m: Finite = key("above the bottom of the shell")
+    azimuth_deg: Finite = key("about the axis, clockwise from +y")
+    residual_mm: Finite = key("outwards from the wall as the other points show it")
+
+
 class WallShapeRecord(Saved):
     """The shape of an upright wall, for inspections."""
 
     state: str = key('"as_found": loaded as it was surveyed; "unloaded": head taken off')
+    set_aside: list[ShapeSetAside] = key("points near the wall that are not judged")
     nominal_radius_m: Finite = key("inside, by the drawing")
     levels: list[ShapeLevel] = key("from the bottom up")
-    azimuth_deg: list[Finite] = key("of the generatrices, clockwise from +y")
     plumbs: list[ShapePlumb] = key("each level with a known centre against the lowest of these")
     axis: ShapeAxis | None = key("null: fewer than two centres are known")
     courses: list[ShapePlumb] = key("those with two levels far enough apart")
@@ -80,9 +91,14 @@ def shape_record(job, wall):
                          1000 * shape.axis.u_m[2], shape.axis.dof[2])  # fmt: skip
     return WallShapeRecord(
         shape.state,
+        [
+            ShapeSetAside(
+                one.point, one.height_m, np.degrees(one.azimuth_rad), 1000 * one.residual_m
+            )
+            for one in shape.set_aside
+        ],
         nominal_inside_m(job, job.courses[0]),
         [_level(*one) for one in zip(shape.levels, shape.radii, shape.centres_m, strict=True)],
-        np.degrees(shape.azimuth_rad),
         [_plumb(one, heights, None) for one in shape.plumbs],
         axis,
         [_plumb(one, heights, shape.levels[one.low].course + 1) for one in shape.courses],
@@ -98,8 +114,8 @@ def _level(level, radii, centre):
 
 
 def _plumb(one, heights, course):
-    found = one.figures
+    found, azimuth = one.figures, np.degrees(one.azimuth_rad)
     return ShapePlumb(
-        course, heights[one.low], heights[one.high],
+        course, heights[one.low], heights[one.high], azimuth, one.is_read,
         1000 * found.value_m, 1000 * found.u_m, found.dof,
     )  # fmt: skip

@@ -3,6 +3,11 @@
 The linear functionals of `estimate`, g = A y, for a radius at a course, height and azimuth, and for
 the coordinates of the centre of a ring, which no prior binds: all with one another, so that what
 two places share drops out of their difference.
+
+Where there is a reading, the best estimate draws it towards its neighbours, which is right on the
+average and wrong at a dent: the larger a departure is among small ones, the more of it is lost. So
+a place may be asked for as it was read, y_i less the centre of its ring: unbiased whatever the wall
+does there, and hardly less certain.
 """
 
 from dataclasses import dataclass
@@ -24,11 +29,14 @@ class Spots:
     zeta : ndarray, shape (p,)
         Height within the course, -1 at its bottom to +1 at its top.
     azimuth_rad : ndarray, shape (p,)
+    site : ndarray of int, shape (p,), optional
+        Reading of the field at that very place that is to count as it was read; -1: the estimate.
     """
 
     course: np.ndarray
     zeta: np.ndarray
     azimuth_rad: np.ndarray
+    site: np.ndarray | None = None
 
     def __len__(self):
         return len(self.course)
@@ -70,6 +78,20 @@ class FieldValues:
         with_free = scipy.linalg.cho_solve(normal, (design - across @ by_columns).T).T
         across += with_free @ field._columns[0].T
         self.weights = scipy.linalg.cho_solve(factor, across.T, check_finite=False).T
+        if spots.site is not None and np.any(spots.site >= 0):
+            self._take_as_read(np.flatnonzero(spots.site >= 0))
+
+    def _take_as_read(self, rows):
+        """Put readings in place of estimates: each less all but the radius of what is free."""
+        field, sites = self._field, self._spots.site[rows]
+        factor, _, normal = field._factored
+        design, radii = field._columns
+        others = design[sites].copy()
+        others[np.arange(len(rows)), radii[field.sites.course[sites]]] = 0.0
+        free = scipy.linalg.cho_solve(normal, others.T).T @ design.T
+        self.value_m[rows] = field.radius_m[sites] - others @ field._solved[0]
+        self.weights[rows] = -scipy.linalg.cho_solve(factor, free.T, check_finite=False).T
+        self.weights[rows, sites] += 1.0
 
     def unseen(self, index):
         """(f, f) covariance of the errors by what was not seen of one component, m2."""
