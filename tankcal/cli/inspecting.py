@@ -6,7 +6,6 @@ from tankcal.cli.arguments import add_language
 from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.showing import (
     Progress,
-    language_of_run,
     marks,
     prepare_for_small_work,
     print_paths,
@@ -32,8 +31,8 @@ def add(commands):
         description="Inspect an upright tank by the survey that calibrates it: plumb, roundness, "
         "peaking and banding where it was scanned, settlement where it was levelled; each with its "
         "U, judged by a rule. It is no part of the certificate. docs/inspection.md says how.",
-        epilog="exit status: 0 done, whatever the verdict; 2 the input must be mended; 3 the survey "
-        "has no sound solution.",
+        epilog="exit status: 0 done, whatever the verdict; 2 the input must be mended; 3 the "
+        "survey has no sound solution.",
     )
     inspect.add_argument(
         "source", metavar="JOB", help="a job, a record.json, or a folder of results"

@@ -95,9 +95,9 @@ def basis_of(source, progress, part_progress=None):
     path = Path(source)
     if (path / RECORD).is_file():
         path = path / RECORD
-    found = _of_record(path) if path.suffix.lower() == ".json" else _of_job(path, progress,
-                                                                          part_progress)  # fmt: skip
-    return found
+    if path.suffix.lower() == ".json":
+        return _of_record(path)
+    return _of_job(path, progress, part_progress)
 
 
 def _refuse_others(file, kind):

@@ -1,4 +1,4 @@
-"""Radii at single places of a wall: a second method (conditioning of one joint normal), outlines."""
+"""Radii at single places of a wall: a second method (one joint normal, conditioned), outlines."""
 
 from dataclasses import replace
 
