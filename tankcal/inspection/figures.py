@@ -29,7 +29,7 @@ class Figure:
         None: the rule has none, or what it needs is not given.
     at_least : bool
         Whether the value must reach the limit; else its size must stay within it.
-    azimuth_deg, epoch : float, str or None
+    course, height_m, azimuth_deg, epoch : optional
         Where, and of which epoch or difference of two.
     used : int
         Places that the largest was taken from.
@@ -45,6 +45,8 @@ class Figure:
     dof: float
     limit: InspectionLimit | None
     at_least: bool = False
+    course: int | None = None
+    height_m: float | None = None
     azimuth_deg: float | None = None
     epoch: str | None = None
     used: int = 0

@@ -12,6 +12,7 @@ from scipy.stats import chi2
 from tankcal.adjust import ALPHA
 from tankcal.errors import SolutionError
 from tankcal.geometry.circles import fit_circle
+from tankcal.inspection.epochs import LEAST_POINTS, SHOWN, WIDEST_GAP_DEG, Epoch, Levelling
 from tankcal.inspection.out_of_plane import arcs_after
 from tankcal.job.checking import missing_beside, tiny_sd
 from tankcal.job.contract.shorthand import number, positive
@@ -40,64 +41,11 @@ EDGE_PROFILES = (
            " the shell", 0, 90),
 )  # fmt: skip
 ONE_EPOCH = "1"  # the name of an epoch that has none
-LEAST_POINTS, LEAST_READINGS = 8, 5
+LEAST_READINGS = 5
 MOST_RISE_M = 2.0  # of one epoch, or along one profile: more is another unit
 LEAST_SD_MM = 0.01
-WIDEST_GAP_DEG = 90.0
 SAME_PLACE_DEG, SAME_AZIMUTH_DEG = 1.0, 0.05  # of one point's rows; of two points
 OFF_CIRCLE = 0.05  # of the radius
-SHOWN = 5  # names in one line
-
-
-@dataclass(frozen=True)
-class Epoch:
-    """Elevations of one epoch, or their changes, by azimuth.
-
-    Attributes
-    ----------
-    name : str
-        Of the epoch.
-    since : str or None
-        The earlier one of a difference.
-    points : tuple of str
-        Names.
-    azimuth_rad, z_m, u_m : ndarray, shape (n,)
-        Rising from 0 to 2 pi, clockwise from +y; elevations (means of repeats), and their standard
-        uncertainties, nan where none is known.
-    """
-
-    name: str
-    since: str | None
-    points: tuple[str, ...]
-    azimuth_rad: np.ndarray
-    z_m: np.ndarray
-    u_m: np.ndarray
-
-
-@dataclass(frozen=True)
-class Levelling:
-    """Every epoch of settlement.csv.
-
-    Attributes
-    ----------
-    file : str
-        Its name.
-    epochs : tuple of Epoch
-        Dates in their order, other names in the order of the file.
-    sd_known : bool
-        Whether s_mm was given; else it is of the repeats, if there are any.
-    dof : float
-        Degrees of freedom of all standard deviations: inf as given, else those of the repeats; 0:
-        none is known.
-    radius_m : float or None
-        Of the circle through the points; None: they came with azimuths.
-    """
-
-    file: str
-    epochs: tuple[Epoch, ...]
-    sd_known: bool
-    dof: float
-    radius_m: float | None
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,14 @@ changes.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, f
 
 from tankcal.gum.coverage import coverage_factor
+from tankcal.inspection.epochs import Epoch, differences, is_within_noise, warn_of_points
 from tankcal.inspection.figures import PROBABILITY, Figure
-from tankcal.inspection.levelling import LEAST_POINTS, SHOWN, WIDEST_GAP_DEG, Epoch
 from tankcal.inspection.out_of_plane import (
     Curvature,
     Neighbours,
     Plane,
-    arcs_after,
     between_neighbours,
     explained_share,
     fit_plane,
@@ -25,12 +23,10 @@ from tankcal.inspection.out_of_plane import (
     spaced_subset,
 )
 from tankcal.inspection.settlement_limits import largest_curvature
-from tankcal.messages import list_some, message
+from tankcal.messages import message
 from tankcal.record.inspection import Settlement, SettlementPoint
 
 SAME_TANK = 1.25  # ratio of two diameters that are of one tank
-OTHER_DATUM_M = 1.0  # a tank does not settle by more: the epochs have no bench mark in common
-WITHIN_NOISE = 0.05  # level at which elevations are all the same but for their errors
 
 
 @dataclass(frozen=True)
@@ -126,7 +122,7 @@ def assess_settlement(levelling, strength, limits, log):
         log.problem(levelling.file, text, None, "x_m")
         return [], []
     for epoch in levelling.epochs:
-        _warn_of_points(epoch, levelling.file, strength.diameter_m, limits, log)
+        warn_of_points(epoch, levelling.file, strength.diameter_m, limits, log)
     epochs = [*levelling.epochs, *differences(levelling, log)]
     assessed = [assess(one, levelling.dof, strength, limits) for one in epochs]
     figures = [figure for one in assessed for figure in figures_of(one, limits)]
@@ -193,74 +189,6 @@ def _largest(neighbours, S, u, limits_m):
     return Largest(int(neighbours.places[at]), float(S[at]), float(u[at]), limit)
 
 
-# ---- epochs
-
-
-def differences(levelling, log):
-    """Epochs of changes: each later one since the first, and the last since the one before it."""
-    pairs = [(one, levelling.epochs[0]) for one in levelling.epochs[1:]]
-    if len(pairs) > 1:
-        pairs.append((levelling.epochs[-1], levelling.epochs[-2]))
-    found = [_difference(*pair, levelling.file, log) for pair in pairs]
-    return [one for one in found if one is not None]
-
-
-def _difference(later, earlier, file, log):
-    """Epoch of the change at the points of both; None, and a warning, where they are too few."""
-    places = {point: i for i, point in enumerate(earlier.points)}
-    both = [i for i, point in enumerate(later.points) if point in places]
-    others = [places[later.points[i]] for i in both]
-    alone = [*dict.fromkeys(point for point in (*later.points, *earlier.points)
-                            if point not in places or point not in later.points)]  # fmt: skip
-    z = later.z_m[both] - earlier.z_m[others]
-    gaps = np.degrees(arcs_after(later.azimuth_rad[both])) if both else np.array([360.0])
-    names = {"later": later.name, "earlier": earlier.name}
-    if len(both) < LEAST_POINTS or gaps.max() > WIDEST_GAP_DEG:
-        text = message("levels_no_difference", "{count} points are in both {later!r} and"
-                       " {earlier!r}; {least} all round would be needed: no difference of the two"
-                       " is made", count=len(both), least=LEAST_POINTS, **names)  # fmt: skip
-        log.warning(file, text, None, "epoch")
-        return None
-    if alone:
-        text = message("levels_alone", "only one of {later!r} and {earlier!r} has {points}: left"
-                       " out of their difference", points=list_some(alone, SHOWN),
-                       **names)  # fmt: skip
-        log.warning(file, text, None, "epoch")
-    if abs(np.mean(z)) > OTHER_DATUM_M:
-        text = message("levels_other_datum", "{later!r} lies {off:.3g} m from {earlier!r} on the"
-                       " whole: without a common bench mark nothing is said of uniform settlement",
-                       off=float(np.mean(z)), **names)  # fmt: skip
-        log.warning(file, text, None, "elevation_m")
-    u = np.hypot(later.u_m[both], earlier.u_m[others])
-    points = tuple(later.points[i] for i in both)
-    return Epoch(later.name, earlier.name, points, later.azimuth_rad[both], z, u)
-
-
-def _warn_of_points(epoch, file, diameter_m, limits, log):
-    """Warnings of too few points for the tank, of an odd number, and of wide gaps."""
-    count, per_point = len(epoch.points), limits.diameter_per_point_m
-    wanted = 0 if per_point is None else int(np.ceil(diameter_m / per_point - 1e-9))
-    wanted += wanted % 2
-    if count < wanted:
-        text = message("levels_fewer_than_asked", "epoch {epoch!r} has {count} points; a tank of"
-                       " {diameter:.4g} m asks for {wanted}", epoch=epoch.name, count=count,
-                       diameter=diameter_m, wanted=wanted)  # fmt: skip
-        log.warning(file, text)
-    if count % 2:
-        text = message("levels_odd", "epoch {epoch!r} has {count} points; an even number is"
-                       " expected, so that diameters close", epoch=epoch.name,
-                       count=count)  # fmt: skip
-        log.warning(file, text)
-    arcs = arcs_after(epoch.azimuth_rad) * diameter_m / 2
-    if limits.largest_arc_m is not None and arcs.max() > limits.largest_arc_m + 1e-6:
-        after = [epoch.points[i] for i in np.flatnonzero(arcs > limits.largest_arc_m + 1e-6)]
-        text = message("levels_wide_gaps", "epoch {epoch!r} has points up to {arc:.3g} m apart,"
-                       " more than {most:.3g} m, after {points}", epoch=epoch.name,
-                       arc=float(arcs.max()), most=limits.largest_arc_m,
-                       points=list_some(after, SHOWN))  # fmt: skip
-        log.warning(file, text)
-
-
 # ---- what is judged, and what is saved
 
 
@@ -273,7 +201,7 @@ def figures_of(assessed, limits):
         ("settlement_subset", assessed.largest_of_subset, len(subset.places)),
     ):
         value = None if one.limit_m is None else 1000 * one.limit_m
-        limit = limits.limit("out_of_plane", value)
+        limit = limits.limit(code, value)
         found.append(_S_figure(code, assessed, one, limit, used))
     curvature = assessed.curvature
     found.append(
@@ -283,7 +211,7 @@ def figures_of(assessed, limits):
             unit="1/m",
             value=curvature.per_m,
             u=assessed.u_curvature_per_m,
-            limit=limits.limit("curvature", assessed.curvature_limit_per_m),
+            limit=limits.limit("settlement_curvature", assessed.curvature_limit_per_m),
             azimuth_deg=float(np.degrees(curvature.azimuth_rad)),
             used=len(every.places),
             remark="up_to_harmonic",
@@ -292,7 +220,7 @@ def figures_of(assessed, limits):
     )
     if assessed.largest_by_arc is not None:
         one = assessed.largest_by_arc
-        limit = limits.limit("de_beer", 1000 * one.limit_m, limits.de_beer_clause)
+        limit = limits.limit("settlement_de_beer", 1000 * one.limit_m, limits.de_beer_clause)
         found.append(_S_figure("settlement_de_beer", assessed, one, limit, len(every.places)))
     return found
 
@@ -331,22 +259,11 @@ def _r2_figure(assessed, limits):
         unit="",
         value=None if noise else assessed.r2,
         u=np.nan if noise else assessed.u_r2,
-        limit=limits.limit("r2", limits.least_r2),
+        limit=limits.limit("settlement_cosine", limits.least_r2),
         at_least=True,
         used=len(assessed.epoch.points),
         remark="within_noise" if noise else None,
     )
-
-
-def is_within_noise(epoch, dof):
-    """Whether the elevations of an Epoch are all the same but for their errors (chi2 or F, 5 %)."""
-    if not dof:
-        return False
-    weights = epoch.u_m**-2.0
-    off = epoch.z_m - np.average(epoch.z_m, weights=weights)
-    weighed, free = float(off**2 @ weights), len(off) - 1
-    chance = chi2.sf(weighed, free) if np.isinf(dof) else f.sf(weighed / free, free, dof)
-    return bool(chance > WITHIN_NOISE)
 
 
 def settlement_of(assessed, strength, sd_known):

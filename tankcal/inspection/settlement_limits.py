@@ -47,11 +47,11 @@ BULGE = (
 
 @dataclass(frozen=True)
 class SettlementLimits:
-    """Limits of `[settlement]`; a value that is not given is None."""
+    """Limits of `[settlement]`; without a rule there are none, and the subset is 30 ft apart."""
 
-    curvature_factor: float
-    least_points: int
-    subset_arc_m: float
+    curvature_factor: float | None = None
+    least_points: int = 8
+    subset_arc_m: float = 9.144
     least_r2: float | None = None
     de_beer: float | None = None
     de_beer_clause: str = ""
@@ -89,7 +89,7 @@ class BulgeLimits:
 
 
 def settlement_limits(section):
-    """SettlementLimits of {key: value} of a rule's `[settlement]`.
+    """SettlementLimits of {key: value} of a rule's `[settlement]`; of None those of no rule.
 
     Examples
     --------
@@ -97,31 +97,27 @@ def settlement_limits(section):
     >>> limits.curvature_factor, limits.de_beer
     (11, None)
     """
-    return SettlementLimits(
-        **_given(section),
-        **{key: int(section[key]) for key in _COUNTS if section.get(key) is not None},
-    )
+    given = _given(section)
+    counts = {key: int(given[key]) for key in ("least_points", "highest_harmonic") if key in given}
+    return SettlementLimits(**(given | counts))
 
 
 def edge_limits(section):
-    """EdgeLimits of {key: value} of a rule's `[edge]`."""
+    """EdgeLimits of {key: value} of a rule's `[edge]`; of None those of no rule."""
     return EdgeLimits(**_given(section))
 
 
 def bulge_limits(section):
-    """BulgeLimits of {key: value} of a rule's `[bulge]`."""
+    """BulgeLimits of {key: value} of a rule's `[bulge]`; of None those of no rule."""
     return BulgeLimits(**_given(section))
 
 
-_COUNTS = ("least_points", "highest_harmonic")
-
-
 def _given(section):
-    return {key: one for key, one in section.items() if one is not None and key not in _COUNTS}
+    return {key: one for key, one in (section or {}).items() if one is not None}
 
 
 def largest_curvature(limits, strength):
-    """Largest curvature of the shell's foot, c Y / (E H), 1/m; None where Y, E or H is not given.
+    """Largest curvature of the shell's foot, c Y / (E H), 1/m; None where one is not given.
 
     In any one system of units it is |S| <= c L^2 Y / (2 E H) of points L apart.
 
@@ -137,7 +133,7 @@ def largest_curvature(limits, strength):
     >>> round(largest_curvature(limits, Strength(21.3, 11.9, yield_pa=160e6, e_pa=206e9)), 8)
     0.00071796
     """
-    if None in (strength.height_m, strength.yield_pa, strength.e_pa):
+    if None in (limits.curvature_factor, strength.height_m, strength.yield_pa, strength.e_pa):
         return None
     return limits.curvature_factor * strength.yield_pa / (strength.e_pa * strength.height_m)
 
