@@ -26,6 +26,8 @@ from tankcal.messages import message
 from tankcal.record.inspection import EdgeProfile, InspectionLimit
 
 FAR_FROM_SHELL_M = 0.3  # of the last reading: from there to the shell the line is carried on
+WIDEST_EDGE, WIDEST_EDGE_M = 0.3, 3.0  # of the radius, and in all
+ZONE = 3.0  # times that: the readings that the bent line goes through
 LEAST_IN_BULGE = 3  # readings: a narrower bulge is not told from one bad reading
 SIGNIFICANT = 2.0  # u that a bulge stands off
 BEYOND_SHELL = 1.02  # of the shell's radius: farther out is another unit, or another tank
@@ -97,38 +99,54 @@ def bent_line(r, unknowns):
     return z + slope * off, np.column_stack(columns)
 
 
-def find_break(r, z, sd=None):
-    """The break-over point of a profile, or None: it does not bend down (at 0.1 %).
+def find_break(r, z, sd, shell_radius_m):
+    """The break-over point of a profile, or None: its edge does not bend down (at 0.1 %).
+
+    Sought within `widest_edge` of the shell, by the readings within three times that. What the
+    bent line leaves of them counts where it is more than their standard deviations.
 
     Parameters
     ----------
     r, z : ndarray, shape (n,)
-        Rising radii and elevations, m; five or more.
-    sd : ndarray, shape (n,), optional
+        Rising radii and elevations, m.
+    sd : ndarray, shape (n,), or None
         Standard deviations; None: by what the bent line leaves.
+    shell_radius_m : float
 
     Returns
     -------
     Break or None
     """
-    weights = np.ones(len(r)) if sd is None else 1.0 / sd
+    widest = widest_edge(shell_radius_m)
+    near = r >= shell_radius_m - ZONE * widest
+    r, z = r[near], z[near]
+    weights = np.ones(len(r)) if sd is None else 1.0 / sd[near]
+    bends = [
+        one for one in _bends(r, z, weights) if one[1][3] >= shell_radius_m - widest
+    ] if len(r) >= LEAST_READINGS else []  # fmt: skip
+    if not bends:
+        return None
     straight = _squares(np.column_stack([np.ones(len(r)), r]), z, weights)[1]
-    squares, unknowns = min(_bends(r, z, weights), key=lambda one: one[0])
-    dof = len(r) - 4
-    gained = straight - squares
+    squares, unknowns = min(bends, key=lambda one: one[0])
+    dof, gained = len(r) - 4, straight - squares
     if unknowns[2] >= unknowns[1] or gained <= 1e-9 * straight:
         return None
-    if sd is not None:
-        chance = chi2.sf(gained, 2)
+    left = squares / dof
+    if sd is not None and left <= 1:
+        factor, chance = 1.0, chi2.sf(gained, 2)
     else:
-        chance = f.sf(gained / 2 / max(squares / dof, 1e-12 * gained), 2, dof)
+        factor, chance = left, f.sf(gained / 2 / max(left, 1e-12 * gained), 2, dof)
     if chance > ALPHA:
         return None
     jacobian = bent_line(r, unknowns)[1] * weights[:, None]
-    factor = squares / dof if sd is None else max(1.0, squares / dof)
     cofactor = factor * np.linalg.inv(jacobian.T @ jacobian)
     z_break, inner, outer, x = map(float, unknowns)
     return Break(x, z_break, inner, outer, cofactor, float(dof) if sd is None else np.inf)
+
+
+def widest_edge(shell_radius_m):
+    """Widest edge of a bottom that is looked for, m: 3 m, of small tanks 0.3 of the radius."""
+    return min(WIDEST_EDGE_M, WIDEST_EDGE * shell_radius_m)
 
 
 def _squares(columns, z, weights):
@@ -253,7 +271,7 @@ def assess_edges(lines, shell_radius_m, edge, bulge, *, file, log):
         _check_reach(line, shell_radius_m, file, log)
     if len(log.problems) > before or not lines:
         return [], []
-    breaks = [find_break(one.radius_m, one.z_m, one.sd_m) for one in lines]
+    breaks = [find_break(one.radius_m, one.z_m, one.sd_m, shell_radius_m) for one in lines]
     profiles = [
         _profile(line, found, shell_radius_m, edge)
         for line, found in zip(lines, breaks, strict=True)
@@ -274,6 +292,14 @@ def _check_reach(line, shell_radius_m, file, log):
         text = message("edge_far_from_shell", "the line at {azimuth:g} degrees ends {gap:.3g} m"
                        " inside of the shell: to there its last slope is carried on",
                        azimuth=line.azimuth_deg, gap=shell_radius_m - last)  # fmt: skip
+        log.warning(file, text, line.row, "radius_m")
+    zone = ZONE * widest_edge(shell_radius_m)
+    near = int(np.count_nonzero(line.radius_m >= shell_radius_m - zone))
+    if near < LEAST_READINGS:
+        text = message("edge_few_near_shell", "the line at {azimuth:g} degrees has {count} readings"
+                       " within {zone:.3g} m of the shell; fewer than {least} do not tell where"
+                       " its edge bends", azimuth=line.azimuth_deg, count=near, zone=zone,
+                       least=LEAST_READINGS)  # fmt: skip
         log.warning(file, text, line.row, "radius_m")
 
 

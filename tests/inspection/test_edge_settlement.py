@@ -33,21 +33,21 @@ def judged(*lines, edge=EDGE, bulge=BULGE):
 
 def test_a_bent_line_is_found_as_it_is():
     """Closed form: no errors, a bend between two readings."""
-    found = find_break(R, bent_line(R, TRUE)[0], np.full(len(R), 0.001))
+    found = find_break(R, bent_line(R, TRUE)[0], np.full(len(R), 0.001), SHELL)
     assert_allclose([found.z_m, found.inner, found.outer, found.radius_m], TRUE, rtol=1e-8)
     assert_allclose(found.drop(SHELL)[0], 0.060 * 1.15)
 
 
 def test_a_bend_at_a_reading():
     true = (*TRUE[:3], 9.4)
-    found = find_break(R, bent_line(R, true)[0], np.full(len(R), 0.001))
+    found = find_break(R, bent_line(R, true)[0], np.full(len(R), 0.001), SHELL)
     assert_allclose(found.radius_m, 9.4, atol=1e-8)
 
 
 def test_best_bend_by_a_grid():
     """Second method: least squares of a line bent at each of 20 000 radii."""
     z = bent_line(R, TRUE)[0] + np.random.default_rng(5).normal(0, 0.002, len(R))
-    found = find_break(R, z)
+    found = find_break(R, z, None, SHELL)
     grid = np.linspace(R[1], R[-2], 20_000)
 
     def squares(x):
@@ -84,10 +84,10 @@ def test_a_straight_bottom_has_no_break():
     rng, found = np.random.default_rng(1), 0
     for _ in range(300):
         z = 12 - 0.01 * R + rng.normal(0, 0.001, len(R))
-        found += find_break(R, z, np.full(len(R), 0.001)) is not None
+        found += find_break(R, z, np.full(len(R), 0.001), SHELL) is not None
     assert found <= 3
-    assert find_break(R, 12 - 0.01 * R) is None
-    assert find_break(R, np.full(len(R), 12.0)) is None
+    assert find_break(R, 12 - 0.01 * R, None, SHELL) is None
+    assert find_break(R, np.full(len(R), 12.0), None, SHELL) is None
 
 
 def test_a_bottom_that_bends_up_has_no_edge_settlement():
@@ -96,6 +96,20 @@ def test_a_bottom_that_bends_up_has_no_edge_settlement():
     assert (figures["edge_settlement"].value, figures["edge_settlement"].remark) == (
         None, "no_break"
     )  # fmt: skip
+
+
+def test_a_bulge_is_no_edge():
+    """A bulge far from the shell bends a line, too: the edge is looked for near the shell."""
+    r = np.arange(0.5, 10.61, 0.25)
+    z = (
+        12
+        - 0.008 * r
+        + bump(r, 6.0, 0.7, 0.028)
+        + np.random.default_rng(6).normal(0, 0.001, len(r))
+    )
+    profiles, figures, _ = judged(radial_line(z, r=r))
+    assert profiles[0].drop_mm is None
+    assert_allclose(figures["bottom_bulge"].value, 28, atol=3)
 
 
 # ---- what is judged
@@ -120,9 +134,13 @@ def test_figure_of_the_worst_line():
 def test_lines_of_another_tank_and_lines_that_end_early():
     _, _, log = judged(radial_line(bent_line(R, TRUE)[0], r=R * 1.1))
     assert [one.expected.code for one in log.problems] == ["edge_beyond_shell"]
-    short = R[R < 10.1]
+    short = np.arange(5.0, 10.1, 0.2)
     _, _, log = judged(radial_line(bent_line(short, TRUE)[0], r=short))
     assert [one.expected.code for one in log.warnings] == ["edge_far_from_shell"]
+    coarse = np.array([0.5, 0.6, 0.7, 5.0, 10.6])
+    _, figures, log = judged(radial_line(np.full(5, 12.0), r=coarse))
+    assert [one.expected.code for one in log.warnings] == ["edge_few_near_shell"]
+    assert figures["edge_settlement"].value is None
 
 
 def test_curves_of_a_rule():

@@ -7,8 +7,10 @@ from levelled_tanks import A_MM, LIMITS, TANK_A, settlement_rows
 from messages_told import lines
 from numpy.testing import assert_allclose
 
+from tankcal.inspection.edges import assess_edges
 from tankcal.inspection.levelling import read_edge_profiles, read_settlement
 from tankcal.inspection.settlement import assess_settlement
+from tankcal.inspection.settlement_limits import BulgeLimits, EdgeLimits
 from tankcal.job.tables import Log
 
 POINTS = {f"P{i + 1}": (22.5 * i, 12 + z / 1000) for i, z in enumerate(A_MM)}
@@ -207,6 +209,15 @@ def test_spoilt_files_are_told_or_computed(tmp_path):
         found = read(tmp_path, spoilt)[0]
         if found is not None:
             assess_settlement(found, TANK_A, LIMITS, Log())
+
+
+def test_spoilt_profiles_are_told_or_computed(tmp_path):
+    rng, base = np.random.default_rng(98), EDGE_HEAD + edge_rows() + edge_rows(90, end="1,45")
+    for _ in range(150):
+        spoilt = spoilt_csv(base, rng).encode(errors="surrogatepass")
+        found = read(tmp_path, spoilt, read_edge_profiles)[0]
+        if found is not None:
+            assess_edges(found, 10.65, EdgeLimits(30.83), BulgeLimits(30.83), file="e", log=Log())
 
 
 @pytest.mark.parametrize("cell", HOSTILE_CELLS)
