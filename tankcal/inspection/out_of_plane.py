@@ -17,6 +17,7 @@ from scipy.optimize import minimize_scalar
 
 from tankcal.geometry.form import harmonics
 
+NEARLY = 1.25  # times as many points as a subset needs: none is left out
 _STEPS = 32  # of the search for the largest curvature, along the shortest wave
 
 
@@ -220,7 +221,7 @@ def spaced_subset(azimuth_rad, residual_m, radius_m, *, arc_m, least):
     Returns
     -------
     ndarray of int
-        Their places, rising; all n where there are not more than are wanted.
+        Their places, rising; all n where they are hardly more than are wanted.
 
     Examples
     --------
@@ -231,7 +232,7 @@ def spaced_subset(azimuth_rad, residual_m, radius_m, *, arc_m, least):
     count, size = len(azimuth_rad), np.abs(residual_m)
     wanted = max(least, int(np.ceil(2 * np.pi * radius_m / arc_m - 1e-9)))
     wanted += wanted % 2
-    if count <= wanted:
+    if count <= NEARLY * wanted:
         return np.arange(count)
     farthest = int(np.argmax(size))
     chosen = [farthest]

@@ -208,7 +208,7 @@ def test_half_the_points_at_uneven_places():
 
 def test_subset_keeps_the_farthest_on_both_sides():
     rng = np.random.default_rng(11)
-    for count in (17, 28, 40, 64):
+    for count in (19, 28, 40, 64):
         azimuth, left = uneven(count, count), rng.normal(0, 1, count)
         chosen = spaced_subset(azimuth, left, 20.0, arc_m=9.144, least=8)
         assert len(set(chosen)) == len(chosen) == 14  # of 125.7 m
@@ -220,6 +220,8 @@ def test_subset_keeps_the_farthest_on_both_sides():
 def test_few_points_are_their_own_subset():
     chosen = spaced_subset(even_azimuths(8), np.arange(8.0), 30.0, arc_m=9.144, least=8)
     assert chosen.tolist() == [*range(8)]
+    nearly = spaced_subset(even_azimuths(17), np.arange(17.0), 20.0, arc_m=9.144, least=8)
+    assert len(nearly) == 17  # 24 ft apart
 
 
 # ---- uncertainty
