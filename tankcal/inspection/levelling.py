@@ -171,8 +171,8 @@ def _azimuths(values, log):
     has_azimuth, has_x, has_y = (values.columns[name] is not None
                                  for name in ("azimuth_deg", "x_m", "y_m"))  # fmt: skip
     if has_azimuth and (has_x or has_y):
-        text = message("levels_two_places", "given together with azimuth_deg; expected only one of"
-                       " them: azimuths, or coordinates")  # fmt: skip
+        text = message("levels_two_places", "given together with {other}; expected only one of"
+                       " them: azimuths, or coordinates", other="azimuth_deg")  # fmt: skip
         log.problem(values.file, text, None, "x_m" if has_x else "y_m")
     elif has_x != has_y:
         name, other = ("x_m", "y_m") if has_y else ("y_m", "x_m")

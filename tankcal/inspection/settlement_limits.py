@@ -150,7 +150,7 @@ class Strength:
         Yield stress and Young's modulus of its steel.
     """
 
-    diameter_m: float
+    diameter_m: float | None
     height_m: float | None = None
     yield_pa: float | None = None
     e_pa: float | None = None

@@ -8,6 +8,7 @@ import tomllib
 import numpy as np
 import pytest
 
+from tankcal.inspection.bottom import Bottom, inspect_bottom
 from tankcal.inspection.edges import assess_edges
 from tankcal.inspection.levelling import read_edge_profiles, read_settlement
 from tankcal.inspection.settlement import assess_settlement
@@ -85,6 +86,34 @@ def test_edges_of_the_example(truth):
     (bulge,) = (one for one in figures if one.code == "bottom_bulge")
     assert abs(bulge.value - truth["bulge_height_mm"]) <= bulge.U
     assert bulge.azimuth_deg == 200.0
+
+
+def test_both_files_by_one_door():
+    """Second method: the same as each file by itself."""
+    rule = {"settlement": section("settlement", SETTLEMENT), "edge": section("edge", EDGE)}
+    files, log = (FOLDER / "settlement.csv", FOLDER / "edge_profiles.csv"), Log()
+    found = inspect_bottom(*files, TANK, rule, log)
+    assert (log.problems, log.warnings) == ([], [])
+    levelling = read_settlement(files[0], log)
+    saved, figures = assess_settlement(levelling, TANK, settlement_limits(rule["settlement"]), log)
+    assert [*found.settlements] == saved
+    assert [*found.figures[: len(figures)]] == figures
+    assert [one.code for one in found.figures[len(figures) :]] == [
+        "edge_settlement", "bottom_bulge"
+    ]  # fmt: skip
+    assert found.figures[-1].limit is None  # the rule has none
+    assert found.as_built
+    assert inspect_bottom(None, None, TANK, rule, log) == Bottom()
+
+
+def test_problems_of_both_files_and_of_the_tank_come_together(tmp_path):
+    wrong = tmp_path / "settlement.csv"
+    wrong.write_text("point,azimuth_deg,elevation_m\nP,0,x\n")
+    log = Log()
+    no_size = Strength(None)
+    assert inspect_bottom(wrong, tmp_path / "gone.csv", no_size, {}, log) == Bottom()
+    assert [one.file for one in log.problems] == ["settlement.csv", "gone.csv", "settlement.csv"]
+    assert log.problems[-1].expected.code == "bottom_no_diameter"
 
 
 @pytest.mark.slow
