@@ -42,6 +42,8 @@ EDGE_PROFILES = (
 )  # fmt: skip
 ONE_EPOCH = "1"  # the name of an epoch that has none
 LEAST_READINGS = 5
+MOST_POINTS, MOST_EPOCHS, MOST_READINGS, MOST_LINES = 1000, 100, 500, 200
+LONGEST_START = 10_000  # bytes that the heading is looked for in
 MOST_RISE_M = 2.0  # of one epoch, or along one profile: more is another unit
 LEAST_SD_MM = 0.01
 SAME_PLACE_DEG, SAME_AZIMUTH_DEG = 1.0, 0.05  # of one point's rows; of two points
@@ -83,31 +85,38 @@ def read_settlement(path, log):
     if len(log.problems) > before:
         return None
     azimuth, radius_m = placed
-    given = values.of("s_mm")[0] is not None
-    sd_m = values.numbers("s_mm") / 1000
     places = _places(values, azimuth, log)
     groups = _repeats(values, epochs)
+    given = values.of("s_mm")[0] is not None
     pooled, dof = _pooled_sd(values, groups)
     if given:
         _tell_disagreeing(values, groups, log)
-    made = []
-    for name in dict.fromkeys(epochs):
-        points = sorted((p for e, p in groups if e == name), key=lambda p: places.get(p, 0.0))
-        rows = [groups[name, point] for point in points]
-        z = np.array([_mean(values, one, sd_m if given else None) for one in rows])
-        own = [np.sum(sd_m[one] ** -2.0) ** -0.5 for one in rows]
-        u = own if given else [pooled / np.sqrt(len(one)) for one in rows]
-        angle = np.radians([places.get(point, np.nan) for point in points])
-        made.append(Epoch(name, None, tuple(points), angle, z, np.array(u)))
-        _check_epoch(made[-1], values.file, log)
+    sd_m = values.numbers("s_mm") / 1000 if given else np.full(len(epochs), pooled)
+    made = [_epoch(name, values, groups, places, sd_m) for name in dict.fromkeys(epochs)]
+    for one in made:
+        _check_epoch(one, values.file, log)
     if len(log.problems) > before:
         return None
     if not (given or dof):
         text = message("levels_no_sd", "neither s_mm nor a point that was levelled twice: no"
                        " uncertainty is known, so nothing can be said to pass")  # fmt: skip
         log.warning(values.file, text)
-    made = _in_order(made)
-    return Levelling(values.file, tuple(made), given, np.inf if given else float(dof), radius_m)
+    dof = np.inf if given else float(dof)
+    return Levelling(values.file, tuple(_in_order(made)), given, dof, radius_m)
+
+
+def _epoch(name, values, groups, places, sd_m):
+    """Epoch of its rows: points by azimuth, repeats as their mean weighted by their sds."""
+    points = sorted((p for e, p in groups if e == name), key=lambda p: places.get(p, 0.0))
+    rows = [groups[name, point] for point in points]
+    return Epoch(
+        name=name,
+        since=None,
+        points=tuple(points),
+        azimuth_rad=np.radians([places.get(point, np.nan) for point in points]),
+        z_m=np.array([_mean(values, one, sd_m) for one in rows]),
+        u_m=np.array([np.sum(sd_m[one] ** -2.0) ** -0.5 for one in rows]),
+    )
 
 
 def read_edge_profiles(path, log):
@@ -116,8 +125,14 @@ def read_edge_profiles(path, log):
     if values is None:
         return None
     azimuth = values.numbers("azimuth_deg") % 360
-    lines = []
-    for one in dict.fromkeys(azimuth):
+    lines, angles = [], dict.fromkeys(azimuth.tolist())
+    if len(angles) > MOST_LINES:
+        text = message("edge_many_lines", "{count} radial lines; expected at most {most}: has each"
+                       " reading an azimuth of its own?", count=len(angles),
+                       most=MOST_LINES)  # fmt: skip
+        log.problem(values.file, text, None, "azimuth_deg")
+        return None
+    for one in angles:
         rows = np.flatnonzero(azimuth == one)
         rows = rows[np.argsort(values.numbers("radius_m")[rows], kind="stable")]
         lines.append(_radial_line(values, rows, log))
@@ -130,8 +145,7 @@ def _read(path, fields, log):
     before, data = len(log.problems), read_bytes(path, log)
     if data is None:
         return None
-    marks = (";", ",") if b";" in data[:2000] else (",", ".")  # as Brazilian Excel writes
-    table = read_csv(path.name, data, *marks, log)
+    table = read_csv(path.name, data, *_marks(data), log)
     if table is None:
         return None
     values = read_columns(None, table, log, fields)
@@ -141,6 +155,13 @@ def _read(path, fields, log):
     if sds and max(sds) < LEAST_SD_MM:
         log.problem(path.name, tiny_sd("mm", max(sds)), values.rows[0], "s_mm")
     return None if len(log.problems) > before else values
+
+
+def _marks(data):
+    """(separator, decimal mark) by the heading of a CSV file: Brazilian Excel writes ; and ,"""
+    lines = (line.strip() for line in data[:LONGEST_START].splitlines())
+    heading = next((line for line in lines if line and not line.startswith(b"#")), b"")
+    return (";", ",") if b";" in heading else (",", ".")
 
 
 # ---- settlement.csv
@@ -162,6 +183,10 @@ def _epochs_of_rows(values, log):
                            " {first_row}", name=name, known=known,
                            first_row=known_row)  # fmt: skip
             log.problem(values.file, text, row, "epoch")
+    if len(first) > MOST_EPOCHS:
+        text = message("levels_many_epochs", "{count} epochs; expected at most {most}",
+                       count=len(first), most=MOST_EPOCHS)  # fmt: skip
+        log.problem(values.file, text, None, "epoch")
     return names
 
 
@@ -264,8 +289,8 @@ def _pooled_sd(values, groups):
 
 
 def _mean(values, rows, sd_m):
-    """Elevation of the rows of one point, weighted by their standard deviations where given."""
-    weights = None if sd_m is None else sd_m[rows] ** -2.0
+    """Elevation of the rows of one point, weighted by their sds where these are known."""
+    weights = None if np.isnan(sd_m[rows[0]]) else sd_m[rows] ** -2.0
     return np.average(values.numbers("elevation_m")[rows], weights=weights)
 
 
@@ -291,6 +316,12 @@ def _check_epoch(epoch, file, log):
         text = message("levels_few_points", "epoch {epoch!r} has {count} points; expected at least"
                        " {least}", epoch=epoch.name, count=len(epoch.points),
                        least=LEAST_POINTS)  # fmt: skip
+        log.problem(file, text)
+        return
+    if len(epoch.points) > MOST_POINTS:
+        text = message("levels_many_points", "epoch {epoch!r} has {count} points; expected at most"
+                       " {most}", epoch=epoch.name, count=len(epoch.points),
+                       most=MOST_POINTS)  # fmt: skip
         log.problem(file, text)
         return
     gaps = np.degrees(arcs_after(epoch.azimuth_rad))
@@ -332,6 +363,11 @@ def _radial_line(values, rows, log):
         text = message("edge_few_readings", "the line at {azimuth:g} degrees has {count} readings;"
                        " expected at least {least}", azimuth=azimuth, count=len(rows),
                        least=LEAST_READINGS)  # fmt: skip
+        log.problem(values.file, text, row, "azimuth_deg")
+    if len(rows) > MOST_READINGS:
+        text = message("edge_many_readings", "the line at {azimuth:g} degrees has {count} readings;"
+                       " expected at most {most}", azimuth=azimuth, count=len(rows),
+                       most=MOST_READINGS)  # fmt: skip
         log.problem(values.file, text, row, "azimuth_deg")
     for i in np.flatnonzero(np.diff(radius) == 0):
         text = message("edge_same_radius", "the line at {azimuth:g} degrees has {radius:g} m"

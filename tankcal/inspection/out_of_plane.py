@@ -17,6 +17,7 @@ from scipy.optimize import minimize_scalar
 
 from tankcal.geometry.form import harmonics
 
+LEVEL_M = 1e-9  # points that differ by less are level: what is left is rounding
 NEARLY = 1.25  # times as many points as a subset needs: none is left out
 _STEPS = 32  # of the search for the largest curvature, along the shortest wave
 
@@ -125,7 +126,7 @@ def explained_share(z_m, residual_m):
     """
     about_mean = z_m - np.mean(z_m)
     scatter, left = about_mean @ about_mean, residual_m @ residual_m
-    if scatter == 0:
+    if np.ptp(z_m) < LEVEL_M:
         return 1.0, np.zeros(len(z_m))
     gradient = -2 * residual_m / scatter + 2 * left * about_mean / scatter**2
     return float(1 - left / scatter), gradient
@@ -314,5 +315,5 @@ def largest_curvature_of(azimuth_rad, z_m, radius_m, highest):
     )
     at = found.x if -found.fun > size(start)[0] else start
     rows = harmonics([at], highest)[0] * weights
-    sign = np.sign(rows @ unknowns)
+    sign = -1.0 if rows @ unknowns < 0 else 1.0
     return Curvature(highest, float(size(at)[0]), float(at % (2 * np.pi)), sign * rows @ operator)

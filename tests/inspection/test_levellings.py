@@ -44,7 +44,9 @@ def test_two_epochs_are_read(tmp_path):
 
 
 def test_decimal_commas_are_read(tmp_path):
-    text = GOOD.replace(",", ";").replace(".", ",")
+    plain = "# levelled by A; level B; 2024\n\n" + GOOD
+    assert len(read(tmp_path, plain)[0].epochs) == 2
+    text = "# a comment, with a comma\n" + GOOD.replace(",", ";").replace(".", ",")
     assert_allclose(read(tmp_path, text)[0].epochs[0].z_m, [z for _, z in POINTS.values()])
 
 
@@ -194,6 +196,21 @@ def test_all_problems_come_in_one_run(tmp_path):
     assert [(row, column) for _, row, column in codes(read(tmp_path, text)[1])] == [
         (4, "azimuth_deg"), (2, "elevation_m"), (18, "s_mm")
     ]  # fmt: skip
+
+
+def test_more_than_anyone_levels_is_told(tmp_path):
+    many = settlement_rows({"1": {f"A{i}": (i * 0.35, 12) for i in range(1001)}})
+    assert codes(read(tmp_path, many)[1]) == [("levels_many_points", None, None)]
+    epochs = settlement_rows({f"E{i}": POINTS for i in range(101)})
+    assert codes(read(tmp_path, epochs)[1]) == [("levels_many_epochs", None, "epoch")]
+    lines = "azimuth_deg,radius_m,z_m\n" + "".join(f"{i},5,0\n" for i in range(201))
+    assert codes(read(tmp_path, lines, read_edge_profiles)[1]) == [
+        ("edge_many_lines", None, "azimuth_deg")
+    ]
+    line = "azimuth_deg,radius_m,z_m\n" + "".join(f"0,{i / 60},0\n" for i in range(501))
+    assert codes(read(tmp_path, line, read_edge_profiles)[1]) == [
+        ("edge_many_readings", 2, "azimuth_deg")
+    ]
 
 
 @pytest.mark.parametrize("whole", WHOLE)

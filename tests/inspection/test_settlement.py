@@ -307,6 +307,19 @@ def test_level_points_say_nothing_of_the_cosine():
     assert figures(epoch_of(A_MM), TANK_A)["settlement_cosine"].at_least
 
 
+def test_level_points_have_the_uncertainty_of_any_others():
+    """Property: U of what is linear in the elevations is not of the elevations."""
+    flat, others = (figures(epoch_of(z), TANK_A) for z in (np.full(16, 12100.1), A_MM))
+    for code in ("settlement_all", "settlement_subset"):
+        assert_allclose(flat[code].U, others[code].U, rtol=1e-9)
+        assert abs(flat[code].value) < 1e-9
+    assert flat["settlement_curvature"].value < 1e-12
+    assert 5e-5 < flat["settlement_curvature"].U < 2e-4
+    assert figures(epoch_of(np.full(16, 12100.1), s_mm=np.nan), TANK_A, dof=0)[
+        "settlement_cosine"
+    ].value == 1.0  # fmt: skip
+
+
 # ---- what is not given
 
 
