@@ -42,7 +42,7 @@ EDGE_PROFILES = (
 )  # fmt: skip
 ONE_EPOCH = "1"  # the name of an epoch that has none
 LEAST_READINGS = 5
-MOST_POINTS, MOST_EPOCHS, MOST_READINGS, MOST_LINES = 1000, 100, 500, 200
+MOST_POINTS, MOST_EPOCHS, MOST_READINGS, MOST_LINES = 1000, 50, 500, 200
 LONGEST_START = 10_000  # bytes that the heading is looked for in
 MOST_RISE_M = 2.0  # of one epoch, or along one profile: more is another unit
 LEAST_SD_MM = 0.01

@@ -201,7 +201,7 @@ def test_all_problems_come_in_one_run(tmp_path):
 def test_more_than_anyone_levels_is_told(tmp_path):
     many = settlement_rows({"1": {f"A{i}": (i * 0.35, 12) for i in range(1001)}})
     assert codes(read(tmp_path, many)[1]) == [("levels_many_points", None, None)]
-    epochs = settlement_rows({f"E{i}": POINTS for i in range(101)})
+    epochs = settlement_rows({f"E{i}": POINTS for i in range(51)})
     assert codes(read(tmp_path, epochs)[1]) == [("levels_many_epochs", None, "epoch")]
     lines = "azimuth_deg,radius_m,z_m\n" + "".join(f"{i},5,0\n" for i in range(201))
     assert codes(read(tmp_path, lines, read_edge_profiles)[1]) == [
