@@ -18,7 +18,7 @@ SEED = 13
 RADIUS_M, POINTS, FOOT_M = 6.5, 16, 10.25
 LEVEL_SD_MM, EDGE_SD_MM = 0.7, 1.0
 BUILT_MM = {2: (1.5, 40.0), 3: (1.2, 100.0), 5: (0.8, 10.0)}  # waves: amplitude, azimuth of a top
-SETTLED_MM = {0: (-18.0, 0.0), 1: (12.0, 235.0), 2: (6.0, 70.0), 3: (1.0, 30.0)}
+SETTLED_MM = {0: (-18.0, 0.0), 1: (30.0, 235.0), 2: (6.0, 70.0), 3: (1.0, 30.0)}
 SLOPE = -0.008  # of the bottom, towards the shell
 EDGES = {  # azimuth: break-over radius in m, slope of the edge
     20.0: (5.90, -0.020),
