@@ -7,6 +7,7 @@ limits of one kind of check. A rule may lack any of them: a check without limit 
 from dataclasses import dataclass
 from pathlib import Path
 
+from tankcal.inspection.settlement_limits import BULGE, EDGE, SETTLEMENT, SOURCE
 from tankcal.job.contract.shorthand import positive
 from tankcal.job.entries import read_section
 from tankcal.job.fields import Field
@@ -23,10 +24,6 @@ HEAD = (
     Field("verified", "flag", "whether they were read in the text itself"),
     Field("remark", "text", "anything that is to stand beside it"),
 )
-SOURCE = (
-    Field("clause", "text", "where it stands in the text"),
-    Field("verified", "flag", "whether it was read in the text itself"),
-)
 _OF_HEIGHT = positive("part_of_height", "limit as a part of the height", 1, required=True)
 _MOST = positive("most_mm", "largest size, mm", 1e4, required=True)
 SECTIONS = {
@@ -41,6 +38,9 @@ SECTIONS = {
     ),
     "peaking": (_MOST, *SOURCE),
     "banding": (_MOST, *SOURCE),
+    "settlement": SETTLEMENT,
+    "edge": EDGE,
+    "bulge": BULGE,
 }  # fmt: skip
 _FOLDER, _ENDING = "inspection/rules", ".toml"
 
