@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
-from tankcal.inspection.boards import BOARD_M, END_M, bead_height, gaps_of_profile
+from tankcal.inspection.boards import BOARD_M, END_M, REACH_M, bead_height, gaps_of_profile
 from tankcal.inspection.known_welds import BANDING, PEAKING
 
 TOGETHER = 2  # boards along the weld that are averaged: 0.3 m
-LAGS = 2, 4  # boards between those whose scatter is looked at: apart, they share no point
-CALM_M = 0.4  # of the weld, within which gaps tell the noise
+LAGS = 2, 4, 6  # boards between those whose scatter is looked at: apart, they share no point
 FEWEST = 20  # gaps that a scatter is told by
 NORMAL = 1.4826  # sd over median absolute deviation
 LEAST_BEAD_M, SURE_BEAD = 0.001, 3.0  # height of a bead, and over its sd
@@ -128,13 +127,13 @@ def noise_factor(boards):
 
     The gap of a board less the middle of two others, as far on one side as on the other, has the
     variance of the noise where the wall changes evenly along the weld; boards that share no point
-    are taken, at two distances, and the larger scatter counts. By medians: single bends of the
+    are taken, at three distances, and the larger scatter counts. By medians: single bends of the
     wall do not count, the form of many does, and makes U larger.
     """
     ratios = {lag: [] for lag in LAGS}
     for one in boards:
-        calm = np.abs(one.s_m) <= CALM_M
-        gap, noise = one.gap_m[:, calm], one.noise_m2[:, calm]
+        near = np.abs(one.s_m) <= REACH_M + 1e-9
+        gap, noise = one.gap_m[:, near], one.noise_m2[:, near]
         for lag in LAGS:
             if len(gap) > 2 * lag:
                 off = gap[lag:-lag] - (gap[: -2 * lag] + gap[2 * lag :]) / 2

@@ -6,6 +6,7 @@ kept beside welds only: memory hangs on the welds and the scans, never on the po
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -142,23 +143,26 @@ def grid_of_uprights(wall, strips, across_m):
 
 
 def grid_of_rounds(wall, strips, across_m):
-    """`FineGrid` beside horizontal welds: fine rows, and the columns of the wall's cells.
+    """`FineGrid` beside horizontal welds: fine rows, and columns of about 0.15 m.
 
     wall, strips, across_m  as for `grid_of_uprights`
     """
     parts, parent = [wall.grid.edges_m[:1]], []
-    for row, (low, high) in enumerate(
-        zip(wall.grid.edges_m[:-1], wall.grid.edges_m[1:], strict=True)
-    ):
+    for row, (low, high) in enumerate(pairwise(wall.grid.edges_m)):
         by = max(1, round((high - low) / across_m))
         parts.append(low + (high - low) * np.arange(1, by + 1) / by)
         parent += [row] * by
     edges = np.concatenate(parts)
-    middle = (edges[:-1] + edges[1:]) / 2
-    height = middle - wall.joints_m[0]
+    height = (edges[:-1] + edges[1:]) / 2 - wall.joints_m[0]
     near = np.any([np.abs(height - weld.low_m) <= reach for weld, reach in strips], axis=0)
-    kept = np.repeat(near[:, None], wall.grid.columns, axis=1)
-    return _fine_grid(wall, edges, wall.grid.columns, kept, wall.radius_m[:, parent])
+    around = FULL_TURN * wall.surface.radius_m
+    columns = min(wall.grid.columns, max(3, round(around / ALONG_M)))
+    middle = (np.arange(wall.grid.columns) + 0.5) / wall.grid.columns
+    groups = np.searchsorted(middle, np.arange(columns + 1) / columns)
+    turned_over = wall.radius_m.transpose(0, 2, 1)
+    base = [_medians(turned_over[:, low:high]) for low, high in pairwise(groups)]
+    kept = np.repeat(near[:, None], columns, axis=1)
+    return _fine_grid(wall, edges, columns, kept, np.stack(base, axis=2)[:, parent])
 
 
 def turned(angle):

@@ -1,5 +1,6 @@
 """Peaking and banding of the welds of a shell, from the points of its scans."""
 
+from tankcal.geometry.outlines import FULL_TURN
 from tankcal.inspection.known_welds import BANDING, PEAKING, known_welds
 from tankcal.inspection.largest_gaps import GapsFound, largest_gaps, undetermined
 from tankcal.inspection.weld_boards import boards_of, reach_of
@@ -95,11 +96,12 @@ def gaps_of_cloud(passes, wall, welds, limits_mm, *, memory_bytes=MEMORY_BYTES):
 
 def _batches(welds, wall, across_m, memory_bytes):
     """Lists of welds whose cells fit into memory together."""
-    grid, each = wall.grid, len(wall.sides) * BINS * COUNT_BYTES
+    each, around_m = len(wall.sides) * BINS * COUNT_BYTES, FULL_TURN * wall.surface.radius_m
     batch, used = [], 0
     for one in welds:
         rows = 2 * reach_of(one, across_m) / across_m
-        along = grid.columns if one.kind == BANDING else (one.high_m - one.low_m) / ALONG_M + 1
+        tall = one.high_m - one.low_m
+        along = (around_m if one.kind == BANDING else tall) / ALONG_M + 1
         need = each * rows * along
         if batch and used + need > memory_bytes:
             yield batch
