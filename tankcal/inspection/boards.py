@@ -19,6 +19,7 @@ REACH_M = 0.150  # of the weld, within which the largest gap counts
 UNCERTAIN = 0.25  # of the limit: a gap whose u exceeds that is not determined
 END_M = 0.04  # on both sides of an end of the board, where the wall is taken for straight
 HOLE_M = 0.06  # between places of the wall near the weld; wider, and the peak may lie in it
+STEP_M, STEEP = 0.010, 0.4  # no wall rises so much from cell to cell, or is so steep
 BEAD_M = 0.02  # half the width of a bead
 BESIDE_M = 0.0375  # of the wall beside a bead, that is led on under it
 MISSED = 3.0  # over this: of a second difference, what the mean of a cell or a bridge may miss
@@ -72,6 +73,9 @@ class BoardGaps:
 def gaps_of_profile(s_m, e_m, sd_m, *, board_m=BOARD_M, reach_m=REACH_M, has_bead=False):
     """`BoardGaps` of a profile of cells; None where it does not bear a board.
 
+    It has no hole near the weld, the wall on both sides of each end, and no step that none but
+    something on the wall makes.
+
     The wall at an end of the board is that of a straight line through the cells beside it. What
     the mean of a cell misses of a form that bends within it is told by the departure of the cell
     from its neighbours (less their noise): of a sharp ridge a third of it, of a smooth one less.
@@ -97,6 +101,8 @@ def gaps_of_profile(s_m, e_m, sd_m, *, board_m=BOARD_M, reach_m=REACH_M, has_bea
     bead = has_bead & (np.abs(s_m) <= BEAD_M + 1e-9)
     known = np.isfinite(e_m) & ~bead
     if not _has_no_hole(s_m[known | bead], cell, reach_m):
+        return None
+    if _has_step(s_m[known], e_m[known], board_m):
         return None
     weights = _weights(s_m.tobytes(), known.tobytes(), bead.tobytes(), board_m)
     if weights is None:
@@ -124,8 +130,7 @@ def bead_height(s_m, gap_m):
     """
     bead = np.abs(s_m) <= BEAD_M + 1e-9
     known = np.isfinite(gap_m)
-    rows = _bridges(s_m, known & ~bead, bead)
-    if rows is None or not (known & bead).any():
+    if not (known & bead).any() or (rows := _bridges(s_m, known & ~bead, bead)) is None:
         return 0.0
     off = gap_m[bead] - rows @ np.where(known, gap_m, 0.0)
     return float(off[np.nanargmax(np.abs(off))])
@@ -141,6 +146,16 @@ def _has_no_hole(s_m, cell, reach_m):
     if len(near) < 3 or near[0] > cell - reach_m or near[-1] < reach_m - cell:
         return False
     return np.diff(near).max() <= max(HOLE_M, 1.5 * cell)
+
+
+def _has_step(s_m, e_m, board_m):
+    """Does the wall under a board rise faster, within two cells, than a plate does?"""
+    inside = np.abs(s_m) <= board_m / 2 + END_M
+    s, e = s_m[inside], e_m[inside]
+    return any(
+        np.any(np.abs(e[by:] - e[:-by]) > np.maximum(STEP_M, STEEP * (s[by:] - s[:-by])))
+        for by in (1, 2)
+    )
 
 
 @lru_cache(maxsize=512)

@@ -13,11 +13,13 @@ import numpy as np
 from tankcal.geometry.outlines import FULL_TURN
 
 ACROSS_M, WIDEST_M, ALONG_M = 0.0125, 0.05, 0.15  # a cell across the weld, at least and at most
-ENOUGH = 20  # points that a cell should get
-HALF_M, BINS = 0.024, 48  # what is looked at on both sides of the coarse mean
+ENOUGH = 12  # points that a cell should get
+HALF_M, BINS = 0.020, 80  # what is looked at on both sides of the coarse mean
 BIN_M = 2 * HALF_M / BINS
 FEWEST, LEAST_SHARE = 6, 0.4  # points of a mode that says anything, and its share of the cell
-NARROW, WIDE, SPREAD, ROUNDS = 3.0, 12.0, 2.5, 5  # bins and sds on both sides of a mode; rounds
+MODE_BINS = 9  # that the fullest place of a cell is looked for in
+NARROW_M, WIDE_M, FIRST_M = 0.002, 0.012, 0.005  # on both sides of a mode: least, most, at first
+SPREAD, ROUNDS = 2.5, 5  # sds that are averaged over, found in so many rounds
 PART = 1 << 14  # cells at a time, and points
 COUNT_BYTES = 4
 
@@ -186,10 +188,10 @@ def _count(grid, counts, scan, u, turn, distance):
 def _modes(counts):
     """Mean and its sd (n,), m, of the points about the mode of histograms (n, BINS)."""
     place = np.arange(BINS) + 0.5
-    beside = np.pad(counts, ((0, 0), (2, 2)))
-    wide = sum(beside[:, k : k + BINS] for k in range(5))
+    beside = np.pad(counts, ((0, 0), (MODE_BINS // 2, MODE_BINS // 2)))
+    wide = sum(beside[:, k : k + BINS] for k in range(MODE_BINS))
     mean = place[np.argmax(wide, axis=1)]
-    reach = np.full(len(counts), 5.0)
+    reach = np.full(len(counts), FIRST_M / BIN_M)
     with np.errstate(invalid="ignore", divide="ignore"):
         for _ in range(ROUNDS):
             used = np.where(np.abs(place - mean[:, None]) <= reach[:, None], counts, 0.0)
@@ -197,7 +199,7 @@ def _modes(counts):
             mean = used @ place / count
             # a bin is 1/12 wide, squared: what only its middle is known of
             square = np.maximum((used * (place - mean[:, None]) ** 2).sum(axis=1) / count, 1 / 12)
-            reach = np.clip(SPREAD * np.sqrt(square), NARROW, WIDE)
+            reach = np.clip(SPREAD * np.sqrt(square), NARROW_M / BIN_M, WIDE_M / BIN_M)
         told = (count >= FEWEST) & (count >= LEAST_SHARE * counts.sum(axis=1))
         sd = np.sqrt(square / count)
     mean = np.where(told, mean * BIN_M - HALF_M, np.nan)
