@@ -6,6 +6,7 @@ from pathlib import Path
 
 import tankcal.record
 from tankcal.errors import InputError, Problem
+from tankcal.inspection.settlement_limits import Strength
 from tankcal.inspection.shape import Sizes
 from tankcal.job import load
 from tankcal.messages import message
@@ -61,6 +62,18 @@ class Basis:
     sha256: str | None = None
     is_older: bool = False
     survey: object = None
+
+    @property
+    def strength(self):
+        """`Strength` that settlement is limited by, its yield stress as the job says."""
+        said, survey = self.job.get("inspection") or {}, self.sizes
+        known = {"yield_pa": said.get("yield_pa"), "e_pa": self.job["material"]["e_pa"]}
+        return Strength(survey.diameter_m, survey.height_m or None, **known)
+
+    @property
+    def rule(self):
+        """Name of the rule that the job asks for; None: it does not say."""
+        return (self.job.get("inspection") or {}).get("rule")
 
     @property
     def courses_m(self):
@@ -127,7 +140,7 @@ def _of_job(path, progress, part_progress):
         source="job",
         file=job.source,
         folder=path if path.is_dir() else path.parent,
-        job=to_plain(filled_from(JobAsRead, job)),
+        job=to_plain(filled_from(JobAsRead, job, inspection=job.inspection)),
         shape=to_plain(shape_record(job, wall)),
         methods=_methods({name: getattr(job, name) for name in METHODS}, is_wall),
         warnings=to_plain(records_of(dict.fromkeys(placed(job, told)))),

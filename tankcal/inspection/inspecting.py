@@ -1,18 +1,28 @@
 """The assembling of an inspection: figures of all parts, judged, as an `InspectionFile`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tankcal.errors import InputError, Problem
-from tankcal.inspection.basis import basis_of
-from tankcal.inspection.rules import DEFAULT, find_rule
+import numpy as np
+
+from tankcal.errors import Problem
+from tankcal.inspection.basis import RECORD, basis_of
+from tankcal.inspection.bottom import Bottom, inspect_bottom
+from tankcal.inspection.figures import Figure
+from tankcal.inspection.known_welds import known_welds
+from tankcal.inspection.largest_gaps import undetermined
+from tankcal.inspection.levelling import read_edge_profiles, read_settlement
+from tankcal.inspection.rules import DEFAULT, find_rule, limit_of
 from tankcal.inspection.shape import LEAST_READ, Sizes, inspect_shape, not_surveyed
 from tankcal.inspection.verdict import judged
+from tankcal.inspection.welds_of_clouds import gaps_of_result
 from tankcal.job.tables import Log
 from tankcal.messages import message
-from tankcal.record.inspection import CHECKS, InspectedTank, InspectionFile, InspectionRule
+from tankcal.pipeline.cloud_passes import Reading
+from tankcal.record.inspection import InspectedTank, InspectionFile, InspectionRule
 from tankcal.record.texts import WarningRecord, warnings_of
 
+SETTLEMENT, EDGES = "settlement.csv", "edge_profiles.csv"
 NOMINALS = ("drawing", "mean")
 OFF_NOMINAL_MM = 5.0  # of the mean radius: less is within what shells are built to
 
@@ -29,11 +39,18 @@ class Asked:
         Name of a shipped rule, or path of a file; None: as the job says, else DEFAULT.
     nominal : str
         One of NOMINALS: what the radii are compared with, that of the drawing or their own mean.
+    settlement, edges : path or None
+        settlement.csv and edge_profiles.csv; None: files of these names beside a job, if any.
+    yield_pa : float or None
+        Yield stress of the shell's steel; None: as the job says.
     """
 
     source: str | Path
     rule: str | None = None
     nominal: str = "drawing"
+    settlement: str | Path | None = None
+    edges: str | Path | None = None
+    yield_pa: float | None = None
 
 
 def inspect_files(asked, progress=None, part_progress=None) -> InspectionFile:
@@ -64,21 +81,80 @@ def inspect_files(asked, progress=None, part_progress=None) -> InspectionFile:
     >>> [(one.code, one.verdict) for one in found.checks[:2]]
     [('plumbness_axis', 'passed'), ('plumbness_generatrix', 'passed')]
     """
-    log = Log()
-    rule = find_rule(asked.rule or DEFAULT, log)
+    log, progress = Log(), progress or (lambda text: None)
+    rule = None if asked.rule is None else find_rule(asked.rule, log)
+    files = _levelled(asked)
+    _read_alone(files, log)  # what is wrong with them is told before a long survey is computed
     log.stop_if_problems()
-    basis = basis_of(asked.source, progress or (lambda text: None), part_progress)
-    if basis.is_older:
-        raise InputError(Problem(basis.file, _older()))
-    return inspection_of(basis, rule, nominal=asked.nominal)
+    basis = basis_of(asked.source, progress, part_progress)
+    rule = rule or _rule_of_job(basis, log)
+    if basis.is_older and files == (None, None):
+        log.problem(basis.file, _older())
+    log.stop_if_problems()
+    strength = basis.strength
+    if asked.yield_pa is not None:
+        strength = replace(strength, yield_pa=asked.yield_pa)
+    bottom = inspect_bottom(*files, strength, rule.sections, log)
+    log.stop_if_problems()
+    welds = _welds(basis, rule, part_progress, progress)
+    found = inspection_of(basis, rule, bottom, welds, nominal=asked.nominal)
+    told = [_older_warning(basis)] if basis.is_older else []
+    return replace(found, warnings=[*found.warnings, *warnings_of([*log.warnings, *told])])
 
 
-def inspection_of(basis, rule, *, nominal="drawing"):
-    """The `InspectionFile` of a `Basis`, by a `rules.Rule` or none.
+def _levelled(asked):
+    """Paths of the two tables of levelling: as asked, or beside a job; None where there is none."""
+    source, found = Path(asked.source), []
+    folder = source if source.is_dir() else source.parent
+    is_job = not ((source / RECORD).is_file() or source.suffix.lower() == ".json")
+    for given, name in ((asked.settlement, SETTLEMENT), (asked.edges, EDGES)):
+        beside = folder / name if is_job and (folder / name).is_file() else None
+        found.append(beside if given is None else Path(given))
+    return tuple(found)
 
-    nominal  one of NOMINALS
+
+def _read_alone(files, log):
+    """Tell `log` what is wrong with the tables of levelling themselves."""
+    told = Log()  # their warnings come once more with the figures
+    settlement, edges = files
+    if settlement is not None:
+        read_settlement(settlement, told)
+    if edges is not None:
+        read_edge_profiles(edges, told)
+    log.problems += told.problems
+
+
+def _rule_of_job(basis, log):
+    """The rule that a job names, a file beside it, or the usual one; None after telling `log`."""
+    name = basis.rule or DEFAULT
+    is_file = name.lower().endswith(".toml")
+    return find_rule(str(basis.folder / name) if is_file else name, log)
+
+
+def _welds(basis, rule, part_progress, progress):
+    """`GapsFound` at the welds: of the clouds of a job, else of none."""
+    if basis.survey is not None:
+        most = {code: limit_of(rule, code) for code in ("peaking", "banding")}
+        limits = {code: one.value for code, one in most.items() if one is not None}
+        return gaps_of_result(basis.survey, limits, Reading(None, part_progress), progress)
+    given = [one.get("welds_rad") or () for one in basis.job["courses"]]
+    return undetermined(known_welds(basis.courses_m, given), "gap_no_cloud")
+
+
+def inspection_of(basis, rule, bottom=None, welds=None, *, nominal="drawing"):
+    """The `InspectionFile` of what was computed.
+
+    Parameters
+    ----------
+    basis : basis.Basis
+    rule : rules.Rule or None
+        None: figures without limits.
+    bottom : bottom.Bottom, optional
+    welds : largest_gaps.GapsFound, optional
+    nominal : str
+        One of NOMINALS.
     """
-    sizes, own = basis.sizes, []
+    sizes, own, bottom = basis.sizes, [], bottom or Bottom()
     if nominal == "mean":
         sizes = Sizes(None, sizes.height_m, sizes.courses_m)
     if basis.shape is None:
@@ -86,19 +162,40 @@ def inspection_of(basis, rule, *, nominal="drawing"):
     else:
         figures, generatrices, levels = inspect_shape(basis.shape, sizes, rule)
         own += _doubts(basis, sizes, levels)
-    checks = sorted((judged(one) for one in figures), key=lambda one: CHECKS.index(one.code))
+    if welds is not None:
+        figures += [_of_gap(one, limit_of(rule, one.code)) for one in welds.figures]
+    checks = [judged(one) for one in (*figures, *bottom.figures)]  # in the order of CHECKS
     return InspectionFile(
         notice=basis.job["certificate"].get("notice") or "",
         tank=_tank(basis, sizes),
         rule=_rule(rule),
-        as_built=False,
+        as_built=bottom.as_built,
         checks=checks,
         generatrices=generatrices,
         levels=levels,
-        gaps=[],
-        settlements=[],
-        edges=[],
+        gaps=[] if welds is None else list(welds.gaps),
+        settlements=list(bottom.settlements),
+        edges=list(bottom.edges),
         warnings=[*(WarningRecord(**one) for one in basis.warnings), *warnings_of(own)],
+    )
+
+
+def _of_gap(one, limit):
+    """The `Figure` of a `largest_gaps.GapFigure`."""
+    return Figure(
+        code=one.code,
+        unit="mm",
+        value=one.value_mm,
+        U=one.U_mm,
+        k=one.k,
+        dof=np.inf,
+        limit=limit,
+        course=one.course,
+        height_m=one.height_m,
+        azimuth_deg=one.azimuth_deg,
+        used=one.used,
+        remark=one.remark,
+        remark_values=one.remark_values,
     )
 
 
@@ -183,3 +280,12 @@ def _older():
         "a record of a version that did not keep the shape of its wall (radii by azimuth and "
         "height with their covariance); expected its job, or the record of a new run",
     )
+
+
+def _older_warning(basis):
+    text = message(
+        "inspect_older_record_alone",
+        "a record of a version that did not keep the shape of its wall: only what was levelled is "
+        "inspected; the rest needs its job, or the record of a new run",
+    )
+    return Problem(basis.file, text)

@@ -8,7 +8,15 @@ import scipy
 import tankcal
 from tankcal.job.model import InputFile
 from tankcal.job.model.parts import Course, Deadwood
-from tankcal.job.model.settings import Datum, Material, Survey, Switches, TableSpec, Tank
+from tankcal.job.model.settings import (
+    Datum,
+    Inspection,
+    Material,
+    Survey,
+    Switches,
+    TableSpec,
+    Tank,
+)
 from tankcal.pipeline.corrections import Correction
 from tankcal.record import statements, survey, table, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
@@ -46,6 +54,11 @@ class JobAsRead(Saved):
     courses: list[Course] = key("from the bottom up")
     certificate: dict = key("texts; only what was given")
     source: str = key("name of the folder or workbook")
+    inspection: Inspection | None = key(
+        "what an inspection is to know; left out where nothing was said of one",
+        default=None,
+        optional=True,
+    )
 
 
 class Record(Saved, kw_only=True):
@@ -171,4 +184,8 @@ def record_of_adjustment(job, adjustment):
 
 def _beginning(job):
     versions = Versions(platform.python_version(), np.__version__, scipy.__version__)
-    return {"versions": versions, "files": job.files, "job": filled_from(JobAsRead, job)}
+    return {
+        "versions": versions,
+        "files": job.files,
+        "job": filled_from(JobAsRead, job, inspection=job.inspection),
+    }

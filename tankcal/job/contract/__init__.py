@@ -36,7 +36,7 @@ from tankcal.text.form_words import NOTES
 SECTIONS = (
     *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "bottom", "roof"),
     *("shell", "strapping", "liquid", "radii", "change"),
-    *("corrections", "material", "checks"),
+    *("corrections", "material", "checks", "inspection"),
     *("adjustment", "adjustment.camera", "certificate"),
     "csv",
 )
