@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language
+from tankcal.cli.arguments import add_language, positive
 from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.showing import (
     Progress,
@@ -46,6 +46,22 @@ def add(commands):
         default=NOMINALS[0],
         help="what radii are compared with: the drawing's, or their own mean",
     )
+    inspect.add_argument(
+        "--settlement",
+        metavar="FILE",
+        help="elevations round the foot (default: settlement.csv beside the job, if any)",
+    )
+    inspect.add_argument(
+        "--edges",
+        metavar="FILE",
+        help="levelled lines across the bottom (default: edge_profiles.csv beside the job, if any)",
+    )
+    inspect.add_argument(
+        "--yield-mpa",
+        metavar="MPA",
+        type=positive,
+        help="yield stress of the steel, for the limits of settlement (default: as the job says)",
+    )
     inspect.add_argument("--out", metavar="DIR", help="write inspection.json there, all or nothing")
     add_language(inspect)
     inspect.add_argument("--quiet", action="store_true", help="no progress, only problems")
@@ -65,7 +81,10 @@ def _inspect(options):
         refuse_foreign(options.out, (FILE,))
     show = Progress(options.quiet or options.machine)
     show.step(message("inspect_reading", "inspecting {source}", source=options.source))
-    asked = Asked(options.source, options.rule, options.nominal)
+    asked = Asked(
+        options.source, options.rule, options.nominal, options.settlement, options.edges,
+        None if options.yield_mpa is None else 1e6 * options.yield_mpa,
+    )  # fmt: skip
     found = plain_of_inspection(inspect_files(asked, show.step, show.part))
     written = ()
     if options.out is not None:
@@ -128,6 +147,10 @@ VERDICTS = {
     "not_determined": message("inspect_not_determined", "not determined"),
 }
 REASONS = {  # remarks of what is not determined
+    "gap_no_weld": message("inspect_gap_no_weld", "no weld is known"),
+    "gap_no_cloud": message("inspect_gap_no_cloud", "it needs a point cloud"),
+    "gap_too_sparse": message("inspect_gap_too_sparse", "the cloud is too sparse there"),
+    "gap_too_uncertain": message("inspect_gap_too_uncertain", "u exceeds a quarter of the limit"),
     "one_level": message("inspect_one_level", "it needs two levels whose centres are known"),
     "one_level_a_course": message("inspect_one_level_a_course", "it needs two levels in a course"),
     "no_level_there": message("inspect_no_level_there", "no level was surveyed there"),
