@@ -55,14 +55,16 @@ def test_lean_of_the_page(monkeypatch, folder):
 
 
 def test_plumb_and_radii_of_a_known_wall(folder):
-    """Truth: the functions that made the wall, no model of the package; readings without noise."""
+    """Truth: the functions that made the wall, no model of the package; readings of 1 um.
+
+    A radius from a centre that is e off lacks e^2 / (2 R) across: 11 um where the top is 12 mm off.
+    """
     rng = np.random.default_rng(3)
     wall = cylinder()
     for course in range(wall.courses):  # a flat side that grows upwards, and a barrel
-        wall.add(
-            course, lambda a: np.cos(2 * a - 0.7), lambda s, c=course: 1e-3 * (1 + c) * (1 + s)
-        )
-        wall.add(course, np.ones_like, lambda s: 2e-3 * (1 - s**2))
+        up = [lambda s, c=course: 1e-3 * (1 + c) * (1 + s), lambda s: 2e-3 * (1 - s**2)]
+        wall.add(course, lambda a: np.cos(2 * a - 0.7), up[0])
+        wall.add(course, np.ones_like, up[1])
     _, shape = shape_of(wall, survey(rng, wall, rings=2, points=24, noise_m=1e-6), folder)
     levels = shape.levels
     for level, radii in zip(levels, shape.radii, strict=True):
@@ -76,7 +78,7 @@ def test_plumb_and_radii_of_a_known_wall(folder):
         low, high = levels[plumb.low].height_m, levels[plumb.high].height_m
         truth = true_plumb(wall, low, high, plumb.azimuth_rad)
         assert plumb.is_read.all()
-        np.testing.assert_allclose(plumb.figures.value_m, truth, atol=5e-6)
+        np.testing.assert_allclose(plumb.figures.value_m, truth, rtol=0, atol=1.5e-5)
     centres = np.array([one for one in shape.centres_m if one is not None])
     heights = [one.height_m for one in levels if one.ring >= 0]
     truth = [true_level(wall, height, np.zeros(1))[1] for height in heights]
@@ -84,14 +86,17 @@ def test_plumb_and_radii_of_a_known_wall(folder):
 
 
 def test_u_of_what_was_read_is_that_of_readings(folder):
-    """Closed form: two readings of 1 mm make 1.414 mm of plumb; 24 in a ring 0.289 mm of a centre."""
+    """Closed form: two readings of 1 mm make 1.414 mm of plumb; 24 of a ring 0.289 mm of its centre.
+
+    What waves of the wall may do to a centre between the readings comes on top of that.
+    """
     measured = survey(np.random.default_rng(5), cylinder(), rings=2, points=24, noise_m=1e-3)
     _, shape = shape_of(cylinder(), measured, folder)
     np.testing.assert_allclose(1e3 * shape.plumbs[-1].figures.u_m, np.sqrt(2), rtol=2e-3)
-    np.testing.assert_allclose(1e3 * shape.axis.u_m, np.sqrt(2 * 2 / 24), rtol=0.03)
-    high = shape.radii[
-        -1
-    ]  # less the centre of its ring: 3 unknowns of 24 readings, 2 of the centre
+    by_readings = np.sqrt(2 * 2 / 24)
+    assert np.all(1e3 * shape.axis.u_m >= by_readings)
+    assert np.all(1e3 * shape.axis.u_m <= 1.05 * by_readings)
+    high = shape.radii[-1]  # less the centre of its ring: 2 unknowns of 24 readings
     np.testing.assert_allclose(1e3 * high.u_m, np.sqrt(1 - 2 / 24), rtol=0.03)
 
 
@@ -167,7 +172,7 @@ def accepted_beyond(rng, tanks, dof=np.inf):
 
 @pytest.mark.parametrize("dof", [np.inf, 8.0])
 def test_guard_band_of_tanks_at_the_limit(dof, figure):
-    """Simulation: of 10 000 tanks at the limit or beyond at most 2.5 % pass (and its own scatter)."""
+    """Simulation: of 10 000 tanks at the limit or beyond at most 2.5 % pass, but for chance."""
     share = accepted_beyond(np.random.default_rng(11), 10_000, dof)
     figure(f"tanks at or beyond the limit that pass, {dof:g} degrees of freedom", f"{share:.2%}")
     assert share <= 0.025 + 2 * np.sqrt(0.025 * 0.975 / 10_000)
@@ -223,5 +228,6 @@ def test_low_level_is_added_where_none_was_read(folder):
     _, shape = shape_of(cylinder(), measured, folder)
     low = [one for one in shape.levels if one.is_low]
     assert [(one.height_m, one.ring, one.course) for one in low] == [(LOW_M, -1, 0)]
-    assert shape.centres_m[0] is None and not shape.courses
+    assert shape.centres_m[0] is None
+    assert not shape.courses
     assert (low[0].site == -1).all()
