@@ -65,7 +65,7 @@ class SavedPaper(PlainPaper):
         """A warning of the file in the language."""
         said = message_sentence(self.words, one["text"], one["code"], one["values"])
         place = f"{one['file']}: " if one["file"] else ""
-        return f"{place}{said}"
+        return bearable(f"{place}{said}")
 
 
 def bearable(text):
