@@ -21,8 +21,8 @@ def settlements(paper):
     more = len(found) > 1
     return [
         paper.heading("settlement"),
-        paper.paragraph("settlement"),
         *([paper.figure(figures.epochs(paper), "epochs")] if more else []),
+        paper.paragraph("settlement"),
         *(block for one in found for block in settlement(paper, one)),
     ]
 

@@ -10,12 +10,6 @@ from tankcal.report.saved_paper import bearable, shortened
 
 # Verdicts, the gravest first.
 ORDER = ("failed", "guard_band", "not_determined", "no_limit", "passed")
-    "failed",
-    "guard_band",
-    "not_determined",
-    "no_limit",
-    "passed",
-)  # of verdicts, the gravest first
 
 
 def pages(paper, folder=None):
@@ -124,18 +118,23 @@ def checks(paper):
     found = paper.found["checks"]
     if not found:
         return []
-    remarks = [
-        f"{paper.check_name(one['code'])} ({paper.place(one)}): {paper.remark(one)}"
-        for one in found
-        if one["remark"] is not None
-    ]
+    said = remarks(paper)
     unread = any(one["limit"] is not None and not one["limit"]["verified"] for one in found)
     return [
         paper.heading("checks"),
         paper.show(CHECKS, CHECKS.rows(paper.found)),
         *([paper.paragraph("unverified", mark=UNVERIFIED)] if unread else []),
         blocks.paragraph(_decision(paper)),
-        *([paper.heading("remarks", 2), blocks.listing(remarks)] if remarks else []),
+        *([paper.heading("remarks", 2), blocks.listing(said)] if said else []),
+    ]
+
+
+def remarks(paper):
+    """What is to be read beside checks, a sentence each, with the check and its place."""
+    return [
+        f"{paper.check_name(one['code'])} ({paper.place(one)}): {paper.remark(one)}"
+        for one in paper.found["checks"]
+        if one["remark"] is not None
     ]
 
 

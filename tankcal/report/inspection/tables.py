@@ -56,21 +56,20 @@ SHEET_OF_CHECKS = Table(
     "inspection_checks",
     (
         Column("check", sheet=True, width=34),
-        Column("epoch", sheet=True, width=12),
-        Column("course", decimals=0, sheet=True, width=9),
-        Column("height_m", "m", decimals=3, sheet=True, width=9),
-        _azimuth(),
-        Column("value", decimals=_format, sheet=True, width=11),
-        Column("U", decimals=_format, sheet=True, width=11),
-        Column("k", decimals=2, sheet=True, width=7),
-        Column("limit", decimals=_format, sheet=True, width=11),
-        Column("unit", sheet=True, width=8),
+        Column("epoch", sheet=True, width=11),
+        Column("course", decimals=0, sheet=True, width=6),
+        Column("height_m", "m", decimals=3, sheet=True, width=7),
+        Column("azimuth_deg", "deg", decimals=1, sheet=True, width=8),
+        Column("value", decimals=_format, sheet=True, width=9),
+        Column("U", decimals=_format, sheet=True, width=9),
+        Column("k", decimals=2, sheet=True, width=5),
+        Column("limit", decimals=_format, sheet=True, width=9),
+        Column("unit", sheet=True, width=6),
         Column("verdict", sheet=True, width=16),
-        Column("probability", "share", decimals=1, sheet=True, width=12),
-        Column("used", decimals=0, sheet=True, width=9),
-        Column("clause", sheet=True, width=30),
-        Column("verified", words="read", sheet=True, width=14),
-        Column("remark", sheet=True, width=40),
+        Column("probability", "share", decimals=1, sheet=True, width=8),
+        Column("used", decimals=0, sheet=True, width=7),
+        Column("clause", sheet=True, width=26),
+        Column("verified", words="read", sheet=True, width=8),
     ),
 )
 
@@ -226,7 +225,6 @@ def _sheet_row(paper, one):
         "clause": bound["clause"],
         "verified": bound["verified"],
         "unit": one["unit"] or None,
-        "remark": paper.remark(one),
     }
 
 

@@ -37,8 +37,8 @@ def departures(paper):
     drawn = figures.has_map(found)
     return [
         paper.heading("departures"),
-        said,
         *([paper.figure(figures.departures(paper), "departures", **values)] if drawn else []),
+        said,
     ]
 
 
@@ -78,7 +78,7 @@ def welds(paper):
         said = f"{said} {paper.word('texts.largest_gaps', most=MOST_GAPS)}"
     return [
         paper.heading("welds"),
-        blocks.paragraph(said),
         *([paper.figure(figures.welds(paper), "welds")] if drawn else []),
+        blocks.paragraph(said),
         *([paper.show(GAPS, rows, across=2 if len(rows) > MOST_GAPS else None)] if rows else []),
     ]

@@ -1,6 +1,6 @@
 """An inspection as a workbook: every check, place, weld and point, numbers as numbers."""
 
-from tankcal.report.inspection.pages import counts
+from tankcal.report.inspection.pages import counts, remarks
 from tankcal.report.inspection.tables import (
     COURSES,
     EDGES,
@@ -80,7 +80,10 @@ def _checks(book, paper):
         look = {} if number else {"bold": True, "font_size": 12}
         book.paragraph(sheet, row, text, widths, **look)
         row += 1
-    write_table(book, sheet, row + 1, SHEET_OF_CHECKS.name, columns, widths=widths)
+    row = write_table(book, sheet, row + 1, SHEET_OF_CHECKS.name, columns, widths=widths) + 2
+    for text in remarks(paper):
+        book.paragraph(sheet, row, text, widths)
+        row += 1
 
 
 def _sheet(book, code, tables):
