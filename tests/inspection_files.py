@@ -50,7 +50,7 @@ def check(code, unit, value, U, bound=None, *, remark=None, values=None, used=24
     """A figure judged as decision rules are: with its guard band, by the normal distribution."""
     where = {key: place.get(key) for key in ("course", "height_m", "azimuth_deg", "epoch")}
     verdict, probability = "not_determined", None
-    if bound is not None and value is not None and U is not None and remark != "too_uncertain":
+    if bound is not None and value is not None and U is not None and remark != "gap_too_uncertain":
         verdict, probability = _judged(code, value, U, bound.value)
     return InspectionCheck(
         code=code, unit=unit, value=value, U=U, k=None if U is None else K, used=used, limit=bound,
@@ -335,7 +335,7 @@ def few():
     kept = [one for one in found["checks"] if one["code"] in wanted]
     more = [
         *(check(kind, "mm", None, None, limit(kind, 12.7, "10.5.4"), used=0,
-                remark="too_uncertain", values={"share": 0.25})
+                remark="gap_too_uncertain", values={"u_mm": 4.1, "most_mm": 3.175})
           for kind in ("peaking", "banding")),
         *checks_of(one),
     ]  # fmt: skip

@@ -4,6 +4,8 @@ import json
 import re
 import shutil
 import subprocess
+import tomllib
+from pathlib import Path
 from statistics import NormalDist
 
 import numpy as np
@@ -14,6 +16,7 @@ from invented_language import bracketed, without_brackets
 from paper_pages import lone_headings, pages_of, sparse_pages
 from paper_words import texts_in, texts_of
 
+import tankcal
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.record.inspection import CHECKS, VERDICTS
@@ -33,6 +36,7 @@ from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 
 LANGUAGE_OF = dict(zip(KINDS, [*LANGUAGES, "pt-BR"], strict=True))
+RULES = Path(tankcal.__file__).parent / "inspection" / "rules"
 PROGRAM = {"tankcal", "inspection", "mm", "xlsx"}  # and units
 SPACE = "\N{NO-BREAK SPACE}"
 MINUS = "\N{MINUS SIGN}"
@@ -203,6 +207,29 @@ def test_every_remark_takes_any_values(language):
         assert "{" not in said
     unheard = one | {"remark": "unheard", "remark_values": {"x": 2.0, "y": None, "z": ["a", True]}}
     assert paper.remark(unheard).startswith("unheard: x 2, y –, z a, ")
+
+
+def test_a_remark_says_its_values_in_their_units():
+    paper, one = InspectionPaper(plain(), "es"), plain()["checks"][0]
+    values = {"low_m": 0.3, "high_m": 11.6171, "mm_per_m": 2.4698, "one_in": 404.9, "over_m": 11.9}
+    said = paper.remark(one | {"remark": "plumb_between", "remark_values": values})
+    assert said.replace(SPACE, " ") == (
+        "Medido entre 0,30 m y 11,62 m: 2,47 mm/m, uno en 405; el valor es el de 11,90 m."
+    )
+
+
+@pytest.mark.parametrize("path", sorted(RULES.glob("*.toml")), ids=lambda path: path.stem)
+def test_texts_of_shipped_rules_are_known_in_every_language(path):
+    """English words are those of the file, so that other languages have them in their place."""
+    rule = tomllib.loads(path.read_text(encoding="utf-8"))["rule"]
+    known = load_words(DEFAULT)["inspection"]["rule_texts"][path.stem]
+    assert known == {key: rule[key] for key in ("source", "remark")}
+    found = plain()
+    found["rule"] |= {key: rule[key] for key in ("name", "source", "remark")} | {"file": path.name}
+    said = InspectionPaper(found, "pt-BR").found["rule"]
+    assert said["remark"] != rule["remark"]
+    found["rule"] |= {"remark": "Ours"}
+    assert InspectionPaper(found, "pt-BR").found["rule"]["remark"] == "Ours"
 
 
 @pytest.mark.slow

@@ -36,11 +36,7 @@ def settlement(paper, one):
     below.plot(azimuth, of["U_i_mm"], "-", color=FAINT, marker=".", markersize=3,
                label=_indexed(paper.word("legend.U_i")))  # fmt: skip
     _curvatures(paper, below, azimuth, of, points)
-    if one["limit_mm"] is not None:
-        label = {"label": paper.word("legend.limit")}
-        for side in (-one["limit_mm"], one["limit_mm"]):
-            below.axhline(side, color=RED, linewidth=0.9, linestyle="--", **label)
-            label = {}
+    _limits(paper, below, azimuth, one)
     below.axhline(0, color=GREY, linewidth=0.6)
     above.set_ylabel(paper.word("axes.change" if one["since"] else "axes.elevation"))
     below.set_ylabel(_indexed(paper.word("axes.out_of_plane")))
@@ -51,6 +47,18 @@ def settlement(paper, one):
     top = _legend(figure, above, below)
     set_margins(figure, left=0.65, right=0.1, bottom=0.42, top=top, hspace=0.1)
     return figure
+
+
+def _limits(paper, ax, azimuth, one):
+    """The limit of S at every point: where they are not even it is not the same."""
+    limits = [point.get("limit_mm", one["limit_mm"]) for point in one["points"]]
+    if not limits or None in limits:
+        return
+    azimuth = np.concatenate([azimuth[-1:] - 360, azimuth, azimuth[:1] + 360])
+    closed = np.array([limits[-1], *limits, limits[0]])
+    style = {"color": RED, "linewidth": 0.9, "linestyle": "--"}
+    ax.plot(azimuth, closed, **style, label=paper.word("legend.limit"))
+    ax.plot(azimuth, -closed, **style)
 
 
 def _curvatures(paper, ax, azimuth, of, points):

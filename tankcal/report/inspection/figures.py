@@ -189,6 +189,7 @@ def has_map(found):
 def largest_U_mm(found):
     """The largest U of the departures along the generatrices, and the median of all."""
     every = np.concatenate([np.array(row) for row in found["generatrices"]["U_mm"]])
+    every = every[every > 0] if (every > 0).any() else every  # at its foot each departs by nothing
     return float(np.median(every)), float(np.max(every))
 
 

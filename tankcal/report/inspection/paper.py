@@ -21,6 +21,7 @@ UNITS = {  # {of a check: (as it is printed, factor, decimals)}
     "1/m": ("mm/m²", 1e3, 3),  # a curvature: what the slope changes by in a metre
     "": ("", 1.0, 4),
 }
+SUFFIXES = (("_mm", "image mm", 1), ("_m", "m", 2), ("_deg", "deg", 1))  # of values of remarks
 _SPACE = "\N{NO-BREAK SPACE}"
 _SURE, _LOST = 0.9995, 0.0005  # probabilities beyond which a tenth of a percent says nothing
 
@@ -47,9 +48,12 @@ class InspectionPaper(SavedPaper):
 
     def _rule(self, rule):
         """The rule with the texts of a shipped one; those of a file of one's own stay."""
-        known = self.words.get("shipped_rules", {}).get((rule or {}).get("name"))
-        texts = self.words.get("rule_texts", {}).get(known)
-        return rule | texts if texts and rule["file"] == f"{known}.toml" else rule
+        if rule is None:
+            return None
+        name = rule["file"].removesuffix(".toml")
+        english = load_words(DEFAULT)["inspection"]["rule_texts"].get(name, {})
+        own = self.words["rule_texts"].get(name, {})
+        return rule | {key: own[key] for key, text in english.items() if rule[key] == text}
 
     def subject(self):
         """What the papers are about: the tank."""
@@ -135,22 +139,31 @@ class InspectionPaper(SavedPaper):
         code = one["remark"]
         if code is None:
             return None
-        values = {key: self._shown(value) for key, value in one["remark_values"].items()}
+        values = {key: self._shown(key, value) for key, value in one["remark_values"].items()}
         template = self.words["remarks"].get(code)
         if template is None:
             told = ", ".join(f"{key} {value}" for key, value in values.items())
             return f"{code}: {told}" if told else code
         return template.format_map(defaultdict(lambda: NOTHING, values))
 
-    def _shown(self, value):
-        """A value of a remark: a text, a list of them, or a number with four digits."""
+    def _shown(self, key, value):
+        """A value of a remark: texts, or a number in the unit that its key ends with."""
+        if value is None:
+            return NOTHING
         if isinstance(value, list):
-            return ", ".join(map(self._shown, value))
+            return ", ".join(self._shown(key, one) for one in value)
         if isinstance(value, bool):
             return self.words["yes_no"]["yes" if value else "no"]
-        if isinstance(value, int | float):
-            return shortest(value, self.marks, digits=4)
-        return NOTHING if value is None else bearable(value)
+        if not isinstance(value, int | float):
+            return bearable(value)
+        if key == "one_in":
+            return self.number(value, decimals=0)
+        if key == "mm_per_m":
+            return f"{fixed(value, 2, self.marks)}{_SPACE}mm/m"
+        for end, unit, decimals in SUFFIXES:
+            if key.endswith(end):
+                return self.number(value, unit, decimals=decimals)
+        return shortest(value, self.marks, digits=4)
 
 
 def verdict_of(one):
