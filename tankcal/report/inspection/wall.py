@@ -13,6 +13,8 @@ from tankcal.report.inspection.tables import (
     level_rows,
 )
 
+KINDS = ("peaking", "banding")
+
 
 def departures(paper):
     """The map of departures along the generatrices, with their U."""
@@ -61,7 +63,10 @@ def courses(paper):
     rows = course_rows(paper.found)
     if not rows:
         return []
-    return [paper.heading("courses"), paper.show(COURSES, rows), paper.paragraph("courses")]
+    said = paper.word("texts.courses")
+    if any(kind in row for row in rows for kind in KINDS):
+        said = f"{said} {paper.word('texts.courses_gaps')}"
+    return [paper.heading("courses"), paper.show(COURSES, rows), blocks.paragraph(said)]
 
 
 def welds(paper):
@@ -69,9 +74,8 @@ def welds(paper):
     found = paper.found
     if not found["gaps"]:
         return []
-    kinds = ("peaking", "banding")
-    rows = [row for kind in kinds for row in largest_gaps(found, kind)]
-    drawn = any(figures.profiles_of(found, kind) for kind in kinds)
+    rows = [row for kind in KINDS for row in largest_gaps(found, kind)]
+    drawn = any(figures.profiles_of(found, kind) for kind in KINDS)
     known = sum(one["gap_mm"] is not None for one in found["gaps"])
     said = paper.word("texts.gaps", known=known, all=len(found["gaps"]))
     if known > len(rows):
