@@ -29,13 +29,13 @@ def settlements(paper):
 
 def settlement(paper, one):
     """The plane, the figure, the verdicts side by side, the points."""
-    name = bearable(one["epoch"])
+    name, epoch = bearable(epoch_name(one)), bearable(one["epoch"])
     if one["since"] is None:
-        heading = paper.word("headings.epoch", epoch=name)
+        heading = paper.word("headings.epoch", epoch=epoch)
         told = paper.word("texts.epoch_as_built")
     else:
         since = bearable(one["since"])
-        heading = paper.word("headings.difference", epoch=name, since=since)
+        heading = paper.word("headings.difference", epoch=epoch, since=since)
         told = paper.word("texts.epoch_difference", since=since)
     return [
         blocks.heading(heading, 2),
@@ -92,7 +92,7 @@ def _verdicts(paper, one):
     columns = [c for c in CHECKS.on_paper() if c.key not in ("place", "probability")]
     return [
         paper.table("settlement_verdicts", own, [columns[0], USED, *columns[1:]],
-                    epoch=bearable(one["epoch"])),
+                    epoch=name),
     ]  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from tankcal.report.inspection.paper import UNVERIFIED, verdict_of
 from tankcal.report.inspection.tables import CHECKS, LIMITS, limit_rows
 from tankcal.report.inspection.wall import courses, departures, levels, welds
 from tankcal.report.saved_paper import bearable, shortened
+from tankcal.text.digits import NOTHING
 
 # Verdicts, the gravest first.
 ORDER = ("failed", "guard_band", "not_determined", "no_limit", "passed")
@@ -130,11 +131,17 @@ def checks(paper):
 
 
 def remarks(paper):
-    """What is to be read beside checks, a sentence each, with the check and its place."""
+    """What is to be read beside checks: a sentence each, the same of several checks once."""
+    places = {}
+    for one in paper.found["checks"]:
+        if one["remark"] is not None:
+            said = (paper.check_name(one["code"]), paper.remark(one))
+            places.setdefault(said, []).append(paper.place(one))
     return [
-        f"{paper.check_name(one['code'])} ({paper.place(one)}): {paper.remark(one)}"
-        for one in paper.found["checks"]
-        if one["remark"] is not None
+        f"{name}: {said}"
+        if len(found) > 1 or found == [NOTHING]
+        else f"{name} ({found[0]}): {said}"
+        for (name, said), found in places.items()
     ]
 
 
