@@ -137,12 +137,12 @@ def remarks(paper):
         if one["remark"] is not None:
             said = (paper.check_name(one["code"]), paper.remark(one))
             places.setdefault(said, []).append(paper.place(one))
-    return [
-        f"{name}: {said}"
-        if len(found) > 1 or found == [NOTHING]
-        else f"{name} ({found[0]}): {said}"
-        for (name, said), found in places.items()
-    ]
+    return [f"{name}{_where(found)}: {said}" for (name, said), found in places.items()]
+
+
+def _where(places):
+    """The one place of a remark, in brackets; "" of several, or where there is none."""
+    return f" ({places[0]})" if len(places) == 1 and places != [NOTHING] else ""
 
 
 def _decision(paper):
