@@ -7,6 +7,7 @@ from tankcal.report.inspection.tables import CHECKS, EDGES, POINTS
 from tankcal.report.saved_paper import bearable
 from tankcal.report.tables import Column
 
+FEW_POINTS = 32
 SHORT_NAME = 8  # letters of a point: up to so many there is room for two tables side by side
 USED = Column("used", decimals=0)
 SETTLEMENT = ("settlement_cosine", "settlement_all", "settlement_subset", "settlement_curvature",
@@ -28,7 +29,7 @@ def settlements(paper):
 
 
 def settlement(paper, one):
-    """The plane, the figure, the verdicts side by side, the points."""
+    """The figure, the plane, the verdicts side by side."""
     name, epoch = bearable(epoch_name(one)), bearable(one["epoch"])
     if one["since"] is None:
         heading = paper.word("headings.epoch", epoch=epoch)
@@ -42,13 +43,7 @@ def settlement(paper, one):
         paper.figure(figures.settlement(paper, one), "settlement_figure", epoch=name),
         blocks.paragraph(f"{told} {_plane(paper, one)} {_limits(paper, one)}"),
         *_verdicts(paper, one),
-        paper.show(POINTS, one["points"], epoch=name, across=_across(one["points"])),
     ]
-
-
-def _across(points):
-    """How many columns of the page the points are set in: names of users may be long."""
-    return 2 if all(len(point["point"]) <= SHORT_NAME for point in points) else None
 
 
 def _plane(paper, one):
@@ -94,6 +89,25 @@ def _verdicts(paper, one):
         paper.table("settlement_verdicts", own, [columns[0], USED, *columns[1:]],
                     epoch=name),
     ]  # fmt: skip
+
+
+def points(paper):
+    """The points of every settlement, last of all: tables of many rows fill the pages."""
+    found = paper.found["settlements"]
+    if not found:
+        return []
+    tables = [
+        paper.show(POINTS, one["points"], across=_across(one["points"]),
+                   epoch=bearable(epoch_name(one)))
+        for one in found
+    ]  # fmt: skip
+    return [paper.heading("points"), *tables]
+
+
+def _across(points):
+    """How many columns of the page few points are set in; more go on from page to page."""
+    short = all(len(point["point"]) <= SHORT_NAME for point in points)
+    return 2 if short and len(points) <= FEW_POINTS else None
 
 
 def edges(paper):

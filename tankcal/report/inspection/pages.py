@@ -2,7 +2,7 @@
 
 from tankcal.report import blocks
 from tankcal.report.comparison.basis import FILES
-from tankcal.report.inspection.bottom import edges, settlements
+from tankcal.report.inspection.bottom import edges, points, settlements
 from tankcal.report.inspection.paper import UNVERIFIED, verdict_of
 from tankcal.report.inspection.tables import CHECKS, LIMITS, limit_rows
 from tankcal.report.inspection.wall import courses, departures, levels, welds
@@ -28,6 +28,7 @@ def pages(paper, folder=None):
         *welds(paper),
         *settlements(paper),
         *edges(paper),
+        *points(paper),
     ]
 
 
