@@ -95,8 +95,7 @@ class InspectionPaper(SavedPaper):
         """A figure of a check in its unit, all of a check with the same decimals; None of None."""
         if value is None:
             return None
-        symbol, factor, decimals = UNITS.get(one["unit"], (one["unit"], 1.0, 4))
-        decimals = 2 if one["code"] in FINE and one["unit"] == "mm" else decimals
+        symbol, factor, decimals = unit_of(one)
         text = fixed(value * factor, decimals, self.marks)
         return f"{text}{_SPACE}{symbol}" if symbol else text
 
@@ -112,8 +111,7 @@ class InspectionPaper(SavedPaper):
         bound = one["limit"]
         if bound is None:
             return None
-        symbol, factor, decimals = UNITS.get(one["unit"], (one["unit"], 1.0, 4))
-        decimals = 2 if one["code"] in FINE and one["unit"] == "mm" else decimals
+        symbol, factor, decimals = unit_of(one)
         text = shortest(round(bound["value"] * factor, decimals), self.marks)
         sign = "≥" if one["code"] in AT_LEAST else "≤"
         mark = "" if bound["verified"] else f"{_SPACE}{UNVERIFIED}"
@@ -164,6 +162,12 @@ class InspectionPaper(SavedPaper):
             if key.endswith(end):
                 return self.number(value, unit, decimals=decimals)
         return shortest(value, self.marks, digits=4)
+
+
+def unit_of(one):
+    """Unit of a check as it is printed, the factor to it, and the decimals of its figures."""
+    symbol, factor, decimals = UNITS.get(one["unit"], (one["unit"], 1.0, 4))
+    return symbol, factor, 2 if one["code"] in FINE and one["unit"] == "mm" else decimals
 
 
 def verdict_of(one):

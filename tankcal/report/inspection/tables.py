@@ -1,6 +1,6 @@
 """The tables of an inspection, declared once for paper and workbook; their rows."""
 
-from tankcal.report.inspection.paper import UNITS, epoch_name
+from tankcal.report.inspection.paper import epoch_name, unit_of
 from tankcal.report.saved_paper import bearable
 from tankcal.report.tables import Column, Table
 from tankcal.text.digits import NOTHING
@@ -25,7 +25,7 @@ def _said(key, say, **more):
 
 def _format(row):
     """The number format of a check's figures in the workbook, in the unit of the file."""
-    return "0.00E+00" if row["unit"] == "1/m" else UNITS.get(row["unit"], ("", 1.0, 4))[2]
+    return "0.00E+00" if row["unit"] == "1/m" else unit_of(row)[2]
 
 
 CHECKS = Table(
