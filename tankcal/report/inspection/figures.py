@@ -142,9 +142,13 @@ def welds(paper):
                 _profile(paper, ax, gaps[place], limit)
         _same_scale(axes[number][: len(gaps)])
         axes[number][0].set_ylabel(paper.word(f"axes.{kind}"))
-    for ax in axes[-1]:
+    counts = [len(gaps) for gaps in rows.values()]
+    for place in range(across):
+        lowest = max(number for number, count in enumerate(counts) if place < count)
+        ax = axes[lowest][place]
         ax.set_xlabel(paper.word("axes.board"))
         ax.set_xticks(BOARD_TICKS_MM)
+        ax.tick_params(labelbottom=True)
     set_margins(figure, left=0.6, right=0.1, bottom=0.42, top=0.24, hspace=0.3, wspace=0.12)
     return figure
 
