@@ -198,6 +198,20 @@ def test_languages_have_the_same_words(language):
     assert keys(load_words(language)["inspection"]) == keys(load_words(DEFAULT)["inspection"])
 
 
+def test_every_remark_of_an_inspection_has_words():
+    """Codes as the modules that compute give them; one without words comes with its values."""
+    told = re.compile(r"remark|undetermined\(|_no_figure\(")
+    lines = [
+        line
+        for path in RULES.parent.glob("*.py")
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if told.search(line)
+    ]
+    named = {code for line in lines for code in re.findall(r'"([a-z_]+)"(?!:|\])', line)}
+    named -= {"remark", "remark_values", *CHECKS}
+    assert named <= set(load_words(DEFAULT)["inspection"]["remarks"])
+
+
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_every_remark_takes_any_values(language):
     """A place without a value is a dash, a code without words comes with its values."""
