@@ -86,7 +86,7 @@ def test_plumb_and_radii_of_a_known_wall(folder):
 
 
 def test_u_of_what_was_read_is_that_of_readings(folder):
-    """Closed form: two readings of 1 mm make 1.414 mm of plumb; 24 of a ring 0.289 mm of its centre.
+    """Closed form: two readings of 1 mm make 1.414 mm of plumb; 24 of a ring 0.289 of its centre.
 
     What waves of the wall may do to a centre between the readings comes on top of that.
     """
