@@ -93,9 +93,7 @@ def largest_gaps(kind, boards, limit_mm):
         figure = _no_figure(kind, len(boards), "gap_too_uncertain")
         figure.remark_values.update(u_mm=IN_MM * least_m, most_mm=IN_MM * most_m)
         return gaps, figure
-    known = [
-        (one, found) for one, found, is_told in zip(boards, largest, told, strict=True) if is_told
-    ]
+    known = [(boards[i], largest[i]) for i in np.flatnonzero(told)]
     return gaps, _figure(kind, gaps[order[0]], largest[order[0]], known, len(boards), more)
 
 

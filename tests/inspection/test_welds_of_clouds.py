@@ -329,6 +329,7 @@ def test_weld_that_is_hidden_is_not_passed():  # property: the figure says so
     assert peaking.remark_values == {"welds": 2, "determined": 1, "seen": 1.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("hidden_m", "is_told"), [(0.3, True), (0.85, False)])
 def test_weld_of_which_a_part_is_hidden(hidden_m, is_told):  # property: half is asked for
     flat = PeakedShell(peaks=[Peak(0, 1.5, 0.0, 0.1)], **SMALL)
