@@ -12,6 +12,7 @@ from tankcal.job.contract.shorthand import positive
 from tankcal.job.entries import read_section
 from tankcal.job.fields import Field
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
+from tankcal.job.rule_files import tell_unknown_rule
 from tankcal.job.tables import Log, nearest, read_bytes
 from tankcal.messages import message
 from tankcal.record.inspection import InspectionLimit
@@ -93,20 +94,10 @@ def find_rule(name, log):
     if name in shipped_names():
         return shipped_rule(name)
     path = Path(name)
-    is_file_name = name.lower().endswith(_ENDING)
-    if is_file_name and path.is_file():
+    if name.lower().endswith(_ENDING) and path.is_file():
         data = read_bytes(path, log, MAX_SETTINGS_BYTES)
         return None if data is None else parse_rule(path.name, data, log)
-    missing = message("no_rule_file_there", "no such file")
-    found = message("found_rule", "found {name!r}", name=name)
-    expected = message(
-        "no_such_rule",
-        "{missing}; expected a .toml file there, or one of {rules}{hint}",
-        missing=missing if is_file_name else found,
-        rules=[*shipped_names()],
-        hint=nearest(name.removesuffix(_ENDING), shipped_names()),
-    )
-    log.problem("--rule", expected)
+    tell_unknown_rule(name, shipped_names(), log)
     return None
 
 

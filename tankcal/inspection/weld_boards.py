@@ -24,10 +24,17 @@ LEAST_PEAK_M = 0.002  # that a loose weld is put in the middle of
 
 @dataclass(frozen=True)
 class Boards:
-    """Gaps of the boards along a weld (boards, cells); nan: not determined.
+    """Gaps of the boards along a weld.
 
-    s_m      (cells,) places across the weld
-    along    (boards,) middle of each: height of a vertical weld, turn (rad) of a horizontal one
+    Attributes
+    ----------
+    weld : KnownWeld
+    s_m : ndarray, shape (cells,)
+        Places across the weld, m.
+    along : ndarray, shape (boards,)
+        Middle of each board: height of a vertical weld, m; turn of a horizontal one, rad.
+    gap_m, noise_m2, missed_m2 : ndarray, shape (boards, cells)
+        As `boards.BoardGaps` has them; nan: not determined.
     """
 
     weld: object

@@ -18,7 +18,7 @@ from tankcal.messages import message
 from tankcal.pipeline.cloud_cluster import open_passes
 from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
 
-MEMORY_BYTES = 256 << 20  # of the histograms; beyond, welds take turns in passes of their own
+MEMORY_BYTES = 512 << 20  # of the histograms; beyond, welds take turns in passes of their own
 
 
 def gaps_of_result(result, limits_mm, reading=None, progress=None):

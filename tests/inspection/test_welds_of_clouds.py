@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from draws import draws
 from generated_clouds import FULL_TURN, Scene, passes_of, take_scan
-from job_builder import write_job
+from generated_hits import Surface
+from job_builder import write_folder, write_job
 from peaked_shells import (
     DENSITY,
     Band,
@@ -19,6 +20,7 @@ from peaked_shells import (
     largest_of_formula,
     wall_and_passes,
 )
+from scanned_tanks import scanned_parts
 
 import tankcal
 from tankcal.clouds.wall import Passes, find_cloud_wall
@@ -228,21 +230,45 @@ def test_clutter_of_rays_makes_no_peak(clutter):  # truth: the radius of the sce
     wall = find_cloud_wall(passes_of(scans), radius_m=3.0, joints_m=scene.joints_m)
     welds = known_welds([2.0, 2.0], [[one[0] for one in at]] * 2)
     found = gaps_of_cloud(Passes(passes_of(scans)), wall, welds, LIMITS)
-    told = [one for one in found.gaps if one.gap_mm is not None]
-    assert len(told) >= len(welds) - 2  # a pipe all the way up hides its welds
+    off = []
     for weld, gap in zip(welds, found.gaps, strict=True):
         if weld.kind == "peaking" and gap.gap_mm is not None:
-            heights = np.linspace(weld.low_m + 0.15, weld.high_m - 0.15, 12)
             truths = [
-                1000
-                * largest_of_formula(
-                    lambda s, z=z, at=weld.azimuth_rad: scene.radius(
-                        at + s / 3.0, np.full(len(s), z)
-                    )
-                )
-                for z in heights
+                _gap_of_scene(scene, weld.azimuth_rad, z)
+                for z in np.linspace(weld.low_m + 0.15, weld.high_m - 0.15, 12)
             ]
-            assert abs(abs(gap.gap_mm) - np.abs(truths).max()) <= gap.U_mm
+            off.append((abs(gap.gap_mm) - np.abs(truths).max()) / gap.U_mm)
+    assert len(off) >= 6  # a pipe all the way up hides its welds
+    assert np.max(np.abs(off)) < 1.5
+    assert np.count_nonzero(np.abs(off) > 1) <= 1  # U holds for 95 % of 8 welds
+
+
+def _gap_of_scene(scene, azimuth, z):
+    return 1000 * largest_of_formula(
+        lambda s: scene.radius(azimuth + s / scene.radius_m, np.full(len(s), z))
+    )
+
+
+@pytest.mark.slow
+def test_job_with_files_of_a_scanner(tmp_path):
+    """Truth: the radius of the surface that the beams of `scanned_tanks` are followed to."""
+
+    def form(azimuth, z):
+        s = ((azimuth - 1.0 + np.pi) % FULL_TURN - np.pi) * 3.0
+        return 3.0 + 0.004 * np.sin(2 * azimuth) + 0.0005 * z + 0.008 * np.exp(-np.abs(s) / 0.2)
+
+    surface = Surface(form, (0.4, -0.2))
+    parts = scanned_parts(np.random.default_rng(3), surface=surface, columns=2000, rows=160)
+    rows = [[course, float(np.degrees(at))] for course in ("1", "2") for at in (1.0, 4.0)]
+    parts.tables["welds"] = [["course", "azimuth_deg"], *rows]
+    result = tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)), simulated=False)
+    told = []
+    found = gaps_of_result(result, LIMITS, progress=told.append)
+    assert any("5 welds" in str(one) for one in told)
+    for at, gap in zip((1.0, 4.0, 1.0, 4.0), _upright(found), strict=True):
+        truth = 1000 * largest_of_formula(lambda s, at=at: form(at + s / 3.0, 1.0))
+        assert abs(gap.gap_mm - truth) <= gap.U_mm
+        assert gap.U_mm < 2
 
 
 # Where welds are.
@@ -300,7 +326,21 @@ def test_weld_that_is_hidden_is_not_passed():  # property: the figure says so
     assert [one.gap_mm is None for one in _upright(found)] == [True, False]
     peaking = found.figures[0]
     assert (peaking.used, peaking.remark) == (1, "gap_not_all")
-    assert peaking.remark_values == {"welds": 2, "determined": 1}
+    assert peaking.remark_values == {"welds": 2, "determined": 1, "seen": 1.0}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("hidden_m", "is_told"), [(0.3, True), (0.85, False)])
+def test_weld_of_which_a_part_is_hidden(hidden_m, is_told):  # property: half is asked for
+    flat = PeakedShell(peaks=[Peak(0, 1.5, 0.0, 0.1)], **SMALL)
+    cloud = _cloud(flat)
+    away = np.abs(np.arctan2(cloud[:, 0], cloud[:, 1]) - 1.5) * flat.radius_m
+    found = _gaps(flat, [cloud[(away > 0.1) | (cloud[:, 2] > hidden_m)]])
+    assert (_upright(found)[0].gap_mm is not None) == is_told
+    peaking = found.figures[0]
+    assert peaking.remark == ("gap_partly_seen" if is_told else "gap_too_sparse")
+    if is_told:
+        assert 0.6 < peaking.remark_values["seen"] < 0.9
 
 
 def test_survey_without_a_cloud_determines_nothing(tmp_path):  # property
@@ -336,20 +376,17 @@ def test_peak_in_ten_million_points(figure):  # the whole tank of the page
     assert len(cloud) == pytest.approx(1e7, rel=1e-6)
     found = _gaps(tank, [cloud])
     peaking = found.figures[0]
-    assert peaking.value_mm == pytest.approx(1000 * tank.gap(peaks[15]), abs=RECOVERED_MM)
+    off = peaking.value_mm - 1000 * tank.gap(peaks[15])
+    assert abs(off) < RECOVERED_MM
     assert (peaking.course, peaking.used) == (3, 30)
-    figure(
-        "a peak of 8 mm in 1e7 points: found less true",
-        "mm",
-        peaking.value_mm - 1000 * tank.gap(peaks[15]),
-    )
+    figure("a peak of 8 mm in 1e7 points, found less true, mm", round(off, 2))
 
 
 @pytest.mark.study
 @pytest.mark.parametrize("knots_m", [None, 0.06, 0.15, 0.3])
 def test_coverage_with_noise_that_hangs_together(knots_m, figure):
     """Truth: the form; the noise is no model of the package: 1 mm of 2.2 mm hang together."""
-    inside, off = [], []
+    inside, off, flat = [], [], []
     for seed in range(draws(8, 40)):
         rng = np.random.default_rng(seed)
         peaks = [
@@ -367,5 +404,9 @@ def test_coverage_with_noise_that_hangs_together(knots_m, figure):
         for peak, gap in zip(peaks, gaps, strict=True):
             off.append(abs(gap.gap_mm) - abs(1000 * shell.gap(peak)))
             inside.append(abs(off[-1]) <= gap.U_mm)
+            if not peak.size_m:
+                flat.append((abs(gap.gap_mm), gap.U_mm))
     assert np.mean(inside) >= 0.95
-    figure(f"coverage of U of a gap, knots of noise every {knots_m} m", np.mean(inside))
+    knots = f"knots of noise every {knots_m} m"
+    figure(f"coverage of U of a gap, {knots}", np.mean(inside))
+    figure(f"flat welds, gap and U in mm, {knots}", np.mean(flat, axis=0).round(2).tolist())
