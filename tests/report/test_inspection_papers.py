@@ -231,6 +231,8 @@ def test_a_remark_says_its_values_in_their_units():
     assert said.replace(SPACE, " ") == (
         "Medido entre 0,30 m y 11,62 m: 2,47 mm/m, uno en 405; el valor es el de 11,90 m."
     )
+    said = paper.remark(one | {"remark": "gap_partly_seen", "remark_values": {"seen": 0.734}})
+    assert "en 73 % de la longitud" in said.replace(SPACE, " ")
 
 
 @pytest.mark.parametrize("path", sorted(RULES.glob("*.toml")), ids=lambda path: path.stem)

@@ -9,7 +9,6 @@ from tankcal.pipeline import plots
 from tankcal.pipeline.plots import FAINT, GREY, INK, PALE, RED, WIDTH, round_factor, set_margins
 from tankcal.report.camera.drawings import styled
 from tankcal.report.inspection.tables import (
-    checks_of,
     is_low,
     largest_gaps,
     limit_mm,
@@ -195,8 +194,3 @@ def largest_U_mm(found):
     every = np.concatenate([np.array(row) for row in found["generatrices"]["U_mm"]])
     every = every[every > 0] if (every > 0).any() else every  # at its foot each departs by nothing
     return float(np.median(every)), float(np.max(every))
-
-
-def has_limit(found, *codes):
-    """Whether any check of these codes has a limit."""
-    return any(one["limit"] is not None for one in checks_of(found, *codes))

@@ -156,6 +156,8 @@ class InspectionPaper(SavedPaper):
             return bearable(value)
         if key == "one_in":
             return self.number(value, decimals=0)
+        if key == "seen":
+            return self.number(value, "share", decimals=0)
         if key == "mm_per_m":
             return f"{fixed(value, 2, self.marks)}{_SPACE}mm/m"
         for end, unit, decimals in SUFFIXES:
