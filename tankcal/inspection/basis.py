@@ -88,7 +88,8 @@ class Basis:
             nominal = self.shape["nominal_radius_m"]
         elif self.job["tank"]["nominal_diameter_m"] is not None:
             nominal = self.job["tank"]["nominal_diameter_m"] / 2
-        return Sizes(nominal, sum(self.courses_m), self.courses_m)
+        diameter_m = None if nominal is None else 2 * nominal
+        return Sizes(nominal, sum(self.courses_m), self.courses_m, diameter_m)
 
 
 def basis_of(source, progress, part_progress=None):

@@ -13,16 +13,16 @@ from tankcal.inspection.known_welds import known_welds
 from tankcal.inspection.largest_gaps import undetermined
 from tankcal.inspection.levelling import read_edge_profiles, read_settlement
 from tankcal.inspection.rules import DEFAULT, find_rule, limit_of
-from tankcal.inspection.shape import LEAST_READ, Sizes, inspect_shape, not_surveyed
+from tankcal.inspection.shape import LEAST_READ, inspect_shape, not_surveyed
 from tankcal.inspection.verdict import judged
 from tankcal.inspection.welds_of_clouds import gaps_of_result
+from tankcal.job.folder import OF_INSPECTIONS
 from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.pipeline.cloud_passes import Reading
 from tankcal.record.inspection import InspectedTank, InspectionFile, InspectionRule
 from tankcal.record.texts import WarningRecord, warnings_of
 
-SETTLEMENT, EDGES = "settlement.csv", "edge_profiles.csv"
 NOMINALS = ("drawing", "mean")
 OFF_NOMINAL_MM = 5.0  # of the mean radius: less is within what shells are built to
 
@@ -79,7 +79,7 @@ def inspect_files(asked, progress=None, part_progress=None) -> InspectionFile:
     >>> from tankcal.inspection.inspecting import Asked, inspect_files
     >>> found = inspect_files(Asked("examples/silva-1995"))
     >>> [(one.code, one.verdict) for one in found.checks[:2]]
-    [('plumbness_axis', 'passed'), ('plumbness_generatrix', 'passed')]
+    [('plumbness_axis', 'passed'), ('plumbness_generatrix', 'guard_band')]
     """
     log, progress = Log(), progress or (lambda text: None)
     rule = None if asked.rule is None else find_rule(asked.rule, log)
@@ -107,7 +107,7 @@ def _levelled(asked):
     source, found = Path(asked.source), []
     folder = source if source.is_dir() else source.parent
     is_job = not ((source / RECORD).is_file() or source.suffix.lower() == ".json")
-    for given, name in ((asked.settlement, SETTLEMENT), (asked.edges, EDGES)):
+    for given, name in zip((asked.settlement, asked.edges), OF_INSPECTIONS, strict=True):
         beside = folder / name if is_job and (folder / name).is_file() else None
         found.append(beside if given is None else Path(given))
     return tuple(found)
@@ -156,7 +156,7 @@ def inspection_of(basis, rule, bottom=None, welds=None, *, nominal="drawing"):
     """
     sizes, own, bottom = basis.sizes, [], bottom or Bottom()
     if nominal == "mean":
-        sizes = Sizes(None, sizes.height_m, sizes.courses_m)
+        sizes = replace(sizes, nominal_radius_m=None)
     if basis.shape is None:
         figures, generatrices, levels = not_surveyed(rule, sizes, "wall_not_surveyed"), None, []
     else:
@@ -167,7 +167,7 @@ def inspection_of(basis, rule, bottom=None, welds=None, *, nominal="drawing"):
     checks = [judged(one) for one in (*figures, *bottom.figures)]  # in the order of CHECKS
     return InspectionFile(
         notice=basis.job["certificate"].get("notice") or "",
-        tank=_tank(basis, sizes),
+        tank=_tank(basis, sizes, levels),
         rule=_rule(rule),
         as_built=bottom.as_built,
         checks=checks,
@@ -199,9 +199,10 @@ def _of_gap(one, limit):
     )
 
 
-def _tank(basis, sizes):
+def _tank(basis, sizes, levels):
     survey, is_surveyed = basis.job["survey"] or {}, basis.shape is not None
     by_drawing = sizes.nominal_radius_m is not None
+    mean_m = 2 * float(np.mean([one.mean_radius_m for one in levels])) if levels else None
     return InspectedTank(
         id=basis.job["tank"]["id"],
         name=basis.job["source"],
@@ -211,7 +212,7 @@ def _tank(basis, sizes):
         survey_date=survey.get("date"),
         survey_side=survey.get("side") if is_surveyed else None,
         methods=list(basis.methods),
-        nominal_diameter_m=sizes.diameter_m,
+        nominal_diameter_m=sizes.diameter_m if by_drawing else mean_m,
         nominal_source="drawing" if by_drawing else "mean" if is_surveyed else "none",
         height_m=sizes.height_m or None,
         state=basis.shape["state"] if is_surveyed else "as_found",

@@ -35,16 +35,14 @@ class Sizes:
         Of the shell.
     courses_m : tuple of float
         Heights of the courses.
+    diameter_m : float or None
+        Nominal, that limits go by; None: not given.
     """
 
     nominal_radius_m: float | None
     height_m: float
     courses_m: tuple[float, ...]
-
-    @property
-    def diameter_m(self):
-        """Nominal diameter; None where it is not given."""
-        return None if self.nominal_radius_m is None else 2 * self.nominal_radius_m
+    diameter_m: float | None = None
 
 
 @dataclass(frozen=True)

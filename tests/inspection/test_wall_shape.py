@@ -33,7 +33,7 @@ def checks_of(job, wall, rule):
     """{code: InspectionCheck} of a generated wall."""
     found = find_wall(job, lambda text: None)
     courses = tuple(one.height_m for one in job.courses)
-    sizes = Sizes(wall.radius_m, sum(courses), courses)
+    sizes = Sizes(wall.radius_m, sum(courses), courses, 2 * wall.radius_m)
     figures, _, _ = inspect_shape(to_plain(shape_record(job, found)), sizes, shipped_rule(rule))
     return {one.code: judged(one) for one in figures}
 
