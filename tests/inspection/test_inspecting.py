@@ -8,6 +8,7 @@ from conftest import EXAMPLE
 from job_builder import write_job
 
 from tankcal.cli import main
+from tankcal.cli.showing import speak
 from tankcal.errors import InputError
 from tankcal.inspection.inspecting import Asked, inspect_files
 from tankcal.inspection.rules import parse_rule
@@ -167,7 +168,8 @@ def test_json_is_what_is_saved(capsys, kept):
 
 def test_a_line_for_each_check(capsys, kept):
     assert main(["inspect", str(kept), "--quiet", "--language", "es"]) == 0
-    out = capsys.readouterr().out.splitlines()
+    speak("en")
+    out = capsys.readouterr().out.replace("\N{NO-BREAK SPACE}", " ").splitlines()
     assert len(out) == 2 + 7  # the rule, that it was not read, the checks
     assert "Verticalidad, eje: +29,1 mm, U 14,4 mm, límite ≤ 95 mm" in out[2]
 
