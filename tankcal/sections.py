@@ -379,7 +379,7 @@ def sample_of(group, xyz_m, covariance_m2, slope, z_m):
     centre = taubin_circle(xy - middle)[:2] + middle
     noise = radial_covariance(xy, centre, covariance_xy)
     azimuth, radius = polar(xy, *centre)
-    return Sample(azimuth, radius, noise, _zeta(group, xyz_m, z_m))
+    return Sample(azimuth, radius, noise, _zeta(group, xyz_m, z_m), centre)
 
 
 def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):

@@ -1,4 +1,4 @@
-"""What papers of any kind of sights say: words of their tables, a sheet's cells, instruments."""
+"""What papers say: every text of their blocks, words of their tables, a sheet's cells."""
 
 import openpyxl
 
@@ -6,6 +6,8 @@ from tankcal.report import workbook
 from tankcal.report.certificate import _instruments
 from tankcal.report.plain import PlainPaper
 from tankcal.text.words import load_words, translate_record
+
+NO_TEXT = {"kind", "align", "language", "decimal_mark", "part", "svg", "date", "nodes"}
 
 
 def assert_tables_have_words(record, tables, language):
@@ -37,3 +39,30 @@ def instruments_said(record):
             return PlainPaper(self.words).word(key, **values)
 
     return _instruments(Paper())
+
+
+def texts_of(blocks):
+    """Every text of some blocks that a reader sees."""
+
+    def seen(value, key=None):
+        if key in NO_TEXT:
+            return
+        if isinstance(value, str):
+            yield value
+        elif isinstance(value, dict):
+            for name, one in value.items():
+                yield from seen(one, name)
+        elif isinstance(value, list):
+            for one in value:
+                yield from seen(one)
+
+    return [text for block in blocks for text in seen(block.data)]
+
+
+def texts_in(value):
+    """Every text of what is saved."""
+    if isinstance(value, dict):
+        return {text for one in value.values() for text in texts_in(one)}
+    if isinstance(value, list):
+        return {text for one in value for text in texts_in(one)}
+    return {value} if isinstance(value, str) else set()

@@ -81,7 +81,7 @@ def _keys_of_schema(schema, root, path, which):
 
 
 DOCS = Path(__file__).parents[1] / "docs" / "saved-keys.md"
-HEAD = """# Every key of `record.json`, `camera.json`, `plan.json` and `comparison.json`
+HEAD = """# Every key of a saved file
 
 Made from the dataclasses that are saved (`make schemas`), as the JSON schemas in
 `tankcal/record/schemas/` are. What belongs together is told in [the record](record-format.md). A

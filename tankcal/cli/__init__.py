@@ -10,6 +10,7 @@ from tankcal.cli import (
     comparing,
     exporting,
     importing,
+    inspecting,
     linting,
     planning,
     reporting,
@@ -41,6 +42,7 @@ a new tank, step by step:
   tankcal compare old.csv my-tank/results        has the tank changed since its former table?
   tankcal verify my-tank/results                 do the files of a run belong together?
   tankcal export my-tank/results --profile NAME   the table as a gauging system takes it
+  tankcal inspect my-tank                      plumb, roundness and settlement by the same survey
 
 photographs, distances, angles and levels instead of surveyed points:
   tankcal new my-tank --survey photos          (or total-station) write such a job
@@ -113,7 +115,7 @@ def _parser():
     parser.set_defaults(command=None, shown=parser)
     commands = parser.add_subparsers(metavar="COMMAND")
 
-    tables = (linting, table_reading, comparing, exporting, verifying)
+    tables = (linting, table_reading, comparing, exporting, inspecting, verifying)
     rooms = (running, reporting, starting, importing, planning, *tables, camera)
     for room in rooms:
         room.add(commands)

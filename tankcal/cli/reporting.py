@@ -12,13 +12,15 @@ def add(commands):
         "report",
         help="write the papers again, from a record",
         description="Write workbook, notebook, PDFs, web page and CSV files again, all or "
-        "nothing, from record.json alone, or the papers of a comparison from comparison.json: "
-        "nothing is computed again.",
+        "nothing, from record.json alone, or the papers of a comparison from comparison.json, of "
+        "an inspection from inspection.json: nothing is computed again.",
         epilog="exit status: 0 done; 2 the record, the language or the letterhead cannot be used. "
         "Then nothing is written.",
     )
     report.add_argument(
-        "record", metavar="RECORD", help="a record.json or comparison.json, or a folder of results"
+        "record",
+        metavar="RECORD",
+        help="a record.json, comparison.json or inspection.json, or a folder of results",
     )
     report.add_argument(
         "--out",
@@ -54,20 +56,23 @@ def letterhead_of(options):
 
 
 def _report(options):
-    from tankcal.report import outputs
-    from tankcal.report.comparison import comparison_file, rebuild
+    from tankcal.report import comparison, inspection, outputs
 
     show = Progress(options.quiet)
     letterhead = letterhead_of(options)
-    compared = comparison_file(options.record)
-    if compared is not None:
-        language = outputs.known_language(options.language)
-        speak(language)
-        out = Path(options.out) if options.out else compared.parent
-        paths = rebuild(compared, out, language, show.step, letterhead)
-        show.end()
-        print_paths(out, paths)
-        return
+    others = (
+        (comparison.comparison_file(options.record), comparison.rebuild),
+        (inspection.inspection_file(options.record), inspection.rebuild),
+    )
+    for saved, rebuild in others:
+        if saved is not None:
+            language = outputs.known_language(options.language)
+            speak(language)
+            out = Path(options.out) if options.out else saved.parent
+            paths = rebuild(saved, out, language, show.step, letterhead)
+            show.end()
+            print_paths(out, paths)
+            return
     source = outputs.record_file(options.record)
     out = Path(options.out) if options.out else source.parent
     if options.language in LANGUAGES:

@@ -25,12 +25,15 @@ class Sample:
         Covariance, or variances, of the radii, m2.
     zeta : ndarray, shape (n,)
         Height within the course, -1 at its bottom to +1 at its top.
+    centre_m : ndarray, shape (2,)
+        x and y that the radii are taken about, m.
     """
 
     azimuth_rad: np.ndarray
     radius_m: np.ndarray
     covariance_m2: np.ndarray
     zeta: np.ndarray
+    centre_m: np.ndarray
 
 
 def harmonics(azimuth_rad, highest, derivative=0):

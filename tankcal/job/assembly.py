@@ -21,6 +21,7 @@ from tankcal.job.model import (
     End,
     Horizontal,
     InputFile,
+    Inspection,
     Job,
     Material,
     Mesh,
@@ -180,9 +181,18 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         sphere=_sphere(values["sphere"]) if kind == "sphere" else None,
         circumference_m=values["checks"]["circumference_m"],
         diameter_is=values["checks"]["diameter_is"],
+        inspection=_inspection(values["inspection"]),
         mesh=_mesh(values["mesh"], attached.mesh[1]) if kind == "mesh" else None,
         ship=_ship(values["ship"]) if kind == "mesh" and is_ship(values) else None,
     )
+
+
+def _inspection(given):
+    """What an inspection is to know; None: nothing was said of one."""
+    rule, strength = given["rule"], given["yield_mpa"]
+    if rule is None and strength is None:
+        return None
+    return Inspection(rule, None if strength is None else 1e6 * strength)
 
 
 def make_frame(raw, values, tables, measurements, warnings, has_points=True):

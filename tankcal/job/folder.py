@@ -28,6 +28,7 @@ from tankcal.messages import message
 MAX_SETTINGS_BYTES = 1_000_000
 MAX_SETTINGS_LINE = 4000  # characters
 DECIMALS = (".", ",")
+OF_INSPECTIONS = ("settlement.csv", "edge_profiles.csv")  # beside a job, no part of it
 _LONGEST_START = 100_000  # bytes, of comments before a heading
 _DECIMAL_COMMA = re.compile(
     r"(\s*[\w.\"'-]+\s*=\s*[+-]?\d+),(\d+(?:[eE][+-]?\d+)?)\s*(?:#.*)?", re.DOTALL
@@ -124,7 +125,7 @@ def _has_plain_heading(data):
 
 
 def _refuse_unknown_files(names, log):
-    known = [f"{table}.csv" for table in TABLES]
+    known = [*(f"{table}.csv" for table in TABLES), *OF_INSPECTIONS]
     for name in names:
         ending = name.lower().rpartition(".")[2]
         if name.startswith((".", "~")) or name in known or name == REFUSED_FILE:

@@ -112,9 +112,14 @@ def named_rule(name, log):
         data = read_bytes(path, log, MAX_SETTINGS_BYTES)
         rule = None if data is None else parse_rule(path.name, data, log)
         return None if rule is None else (rule, path.name)
-    missing = message("no_rule_file_there", "no such file")
-    _tell_unknown("--rule", None, None, name, missing, shipped_names(), log)
+    tell_unknown_rule(name, shipped_names(), log)
     return None
+
+
+def tell_unknown_rule(name, rules, log):
+    """Tell `log` that --rule names neither a file nor one of these rules."""
+    missing = message("no_rule_file_there", "no such file")
+    _tell_unknown("--rule", None, None, name, missing, rules, log)
 
 
 def find_rule(raw, name, log):

@@ -83,6 +83,9 @@ class Wall:
         {input of the budget: (n,) derivative of the field's readings}, of what points depend on.
     without_inputs : tuple of str
         Inputs that have no meaning for these points.
+    origins_m : ndarray, shape (sections, 2)
+        x and y that the radii of each section were taken about, in the frame of the points: the
+        field's centres count from there.
     """
 
     shell: Shell
@@ -98,6 +101,7 @@ class Wall:
     read: ReadWall | None = None
     by_inputs: dict = field(default_factory=dict)
     without_inputs: tuple = ()
+    origins_m: np.ndarray | None = None
 
     def lowest_outline(self, azimuth_rad):
         """(x, y) of the axis at the bottom, and (n,) radii of the lowest section, m."""
@@ -279,6 +283,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         read=read,
         by_inputs=by_inputs,
         without_inputs=("offset",) if job.hits or job.clouds else (),  # instruments have their own
+        origins_m=np.array([one.centre_m for one in samples]),
     )
 
 

@@ -93,8 +93,8 @@ class InspectedLevel(Saved):
     height_m: Finite = key("above the bottom of the shell")
     course: int = key("from the bottom, 1 first")
     mean_radius_m: Finite = key("inside, of the section about its own centre")
-    centre_x_m: Finite = key("of the section, in the frame of the survey")
-    centre_y_m: Finite = key("of the section, in the frame of the survey")
+    centre_x_m: float | None = key("in the frame of the survey; null: the level is estimated")
+    centre_y_m: float | None = key("in the frame of the survey; null: the level is estimated")
     azimuth_deg: list[Finite] = key("of each place")
     departure_mm: list[Finite] = key("radius from its own centre less the nominal one")
     U_mm: list[Finite] = key("expanded, of each")
@@ -125,6 +125,9 @@ class SettlementPoint(Saved):
     S_i_mm: float | None = key("less the mean of its neighbours; null: too few points")
     U_S_mm: float | None = key("expanded uncertainty of S_i; null: no sd is known")
     in_subset: bool = key("whether the spaced subset takes it")
+    limit_mm: float | None = key(
+        "of S_i, by the arcs to its neighbours; null: yield or height not given", default=None
+    )
 
 
 class Settlement(Saved):
@@ -142,10 +145,12 @@ class Settlement(Saved):
     R2: Finite = key("share of the scatter that the plane explains")
     sd_known: bool = key("whether standard deviations were given; else from the repeats, or none")
     arc_m: Finite = key("between neighbours, mean")
-    limit_mm: float | None = key("of S_i with all points; null: yield or height not given")
+    limit_mm: float | None = key(
+        "of S_i with all points, where it is nearest its limit; null: yield or height not given"
+    )
     limit_half_mm: float | None = key("the same with every second point")
     subset_arc_m: float | None = key("between neighbours of the subset")
-    subset_limit_mm: float | None = key("of S_i of the subset")
+    subset_limit_mm: float | None = key("of S_i of the subset, where it is nearest its limit")
     harmonics: int | None = key("highest that was fitted for the curvature")
     curvature_per_m: float | None = key("largest |d2U/ds2| of the harmonics")
     U_curvature_per_m: float | None = key("expanded")

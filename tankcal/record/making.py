@@ -8,7 +8,15 @@ import scipy
 import tankcal
 from tankcal.job.model import InputFile
 from tankcal.job.model.parts import Course, Deadwood
-from tankcal.job.model.settings import Datum, Material, Survey, Switches, TableSpec, Tank
+from tankcal.job.model.settings import (
+    Datum,
+    Inspection,
+    Material,
+    Survey,
+    Switches,
+    TableSpec,
+    Tank,
+)
 from tankcal.pipeline.corrections import Correction
 from tankcal.record import statements, survey, table, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
@@ -23,6 +31,7 @@ from tankcal.record.ship import ShipRecord, ship_of
 from tankcal.record.strapping import StrappingRecord, strapping_of
 from tankcal.record.tangents import TangentsRecord, tangents_of
 from tankcal.record.versions import FORMAT
+from tankcal.record.wall_shape import WallShapeRecord, shape_record
 from tankcal.tank.deliveries import WorstDeliveries
 
 
@@ -46,6 +55,11 @@ class JobAsRead(Saved):
     courses: list[Course] = key("from the bottom up")
     certificate: dict = key("texts; only what was given")
     source: str = key("name of the folder or workbook")
+    inspection: Inspection | None = key(
+        "what an inspection is to know; left out where nothing was said of one",
+        default=None,
+        optional=True,
+    )
 
 
 class Record(Saved, kw_only=True):
@@ -85,6 +99,11 @@ class Record(Saved, kw_only=True):
         "corrections for trim and list; left out where there are none", default=None, optional=True
     )
     courses: list[survey.CourseOfShell] = key("from the bottom up", default=())
+    wall_shape: WallShapeRecord | None = key(
+        "for inspections; left out where no upright wall was surveyed by points",
+        default=None,
+        optional=True,
+    )
     capacity: table.CapacityTable | None = key("the table", default=None)
     interpolation: table.InterpolationError | None = key("between rows", default=None)
     proportional_parts: table.PartsOfRows | None = key("of millimetres", default=None)
@@ -128,6 +147,7 @@ def record_of(result):
             radii=radii_of(result),
             ship=ship_of(result),
             courses=survey.courses_of(result),
+            wall_shape=shape_record(job, result.wall),
             capacity=table.capacity_of(result),
             interpolation=filled_from(table.InterpolationError, result.straightness),
             proportional_parts=table.proportional_parts_of(result),
@@ -169,4 +189,8 @@ def record_of_adjustment(job, adjustment):
 
 def _beginning(job):
     versions = Versions(platform.python_version(), np.__version__, scipy.__version__)
-    return {"versions": versions, "files": job.files, "job": filled_from(JobAsRead, job)}
+    return {
+        "versions": versions,
+        "files": job.files,
+        "job": filled_from(JobAsRead, job, inspection=job.inspection),
+    }

@@ -10,7 +10,10 @@ FOLDER = Path(__file__).parents[2] / "notebooks"
 TUTORIALS = sorted(FOLDER.glob("*.ipynb"))
 ALL = [*TUTORIALS, *sorted((FOLDER / "studies").glob("*.ipynb"))]
 MOST_LINES = 150
-DOORS = ("tankcal.report", "tankcal.report.planning", "tankcal.report.comparison")
+DOORS = (
+    *("tankcal.report", "tankcal.report.planning", "tankcal.report.comparison"),
+    "tankcal.report.inspection",
+)
 
 
 def code_of(path):

@@ -12,6 +12,7 @@ import pytest
 from compared_tables import HOSTILE, KINDS, hostile, plain, without_uncertainty
 from invented_language import bracketed, without_brackets
 from paper_pages import lone_headings, pages_of, sparse_pages
+from paper_words import texts_in, texts_of
 
 from tankcal.cli import main
 from tankcal.errors import InputError
@@ -26,35 +27,7 @@ from tankcal.report.comparison.workbook import write
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 
-NO_TEXT = {"kind", "align", "language", "decimal_mark", "part", "svg", "date", "nodes"}
 PROGRAM = {"tankcal", "comparison", "mm", "xlsx"}  # and units
-
-
-def texts_of(blocks):
-    """Every text of some blocks that a reader sees."""
-
-    def seen(value, key=None):
-        if key in NO_TEXT:
-            return
-        if isinstance(value, str):
-            yield value
-        elif isinstance(value, dict):
-            for name, one in value.items():
-                yield from seen(one, name)
-        elif isinstance(value, list):
-            for one in value:
-                yield from seen(one)
-
-    return [text for block in blocks for text in seen(block.data)]
-
-
-def texts_in(value):
-    """Every text of a saved comparison."""
-    if isinstance(value, dict):
-        return {text for one in value.values() for text in texts_in(one)}
-    if isinstance(value, list):
-        return {text for one in value for text in texts_in(one)}
-    return {value} if isinstance(value, str) else set()
 
 
 # ---- what is shown

@@ -39,7 +39,7 @@ SECTIONS = (
     *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "ship"),
     *("bottom", "roof"),
     *("shell", "strapping", "liquid", "radii", "change"),
-    *("corrections", "material", "checks"),
+    *("corrections", "material", "checks", "inspection"),
     *("adjustment", "adjustment.camera", "certificate"),
     "csv",
 )

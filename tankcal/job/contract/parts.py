@@ -1,4 +1,4 @@
-"""The keys of [mesh], [corrections] and [checks] of job.toml: most are for some kinds only."""
+"""The keys of [mesh], [corrections], [checks] and [inspection]: most are for some kinds only."""
 
 from tankcal.job.contract.kinds import VERTICAL, WITH_POINTS
 from tankcal.job.contract.shorthand import choice, number, positive
@@ -95,7 +95,24 @@ CHECKS = (
     ),
 )
 
+INSPECTION = (
+    Field(
+        "rule",
+        "rule name",
+        "rule that tankcal inspect judges the tank by: api_653, api_650 or a .toml file beside"
+        " job.toml; blank: api_653",
+        kinds=VERTICAL,
+    ),
+    positive(
+        "yield_mpa",
+        "yield stress of the shell's steel, MPa; limits of settlement need it",
+        2000,
+        kinds=VERTICAL,
+    ),
+)
+
 KEYS = {
+    "inspection": INSPECTION,
     "mesh": MESH,
     "corrections": CORRECTIONS,
     "checks": CHECKS,

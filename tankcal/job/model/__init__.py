@@ -20,6 +20,7 @@ from tankcal.job.model.radii import Change, Radii
 from tankcal.job.model.settings import (
     Datum,
     DeclaredInput,
+    Inspection,
     Material,
     StatedVolume,
     Survey,
@@ -45,6 +46,7 @@ __all__ = [
     "End",
     "Horizontal",
     "InputFile",
+    "Inspection",
     "Job",
     "Material",
     "Mesh",
@@ -114,6 +116,8 @@ class Job:
         Of the first course by tape, outside; only compared.
     diameter_is : {"inside", "middle", "outside"} or None
         What the nominal diameter is; only compared.
+    inspection : Inspection or None
+        What an inspection is to know; None: nothing was said of one.
     strapping : Strapping or None
         Circumferences by tape, in place of points.
     lines : ReferenceLines or None
@@ -161,6 +165,7 @@ class Job:
     rule: Rule | None = None
     circumference_m: float | None = None
     diameter_is: str | None = None
+    inspection: Inspection | None = None
     strapping: Strapping | None = None
     lines: ReferenceLines | None = None
     hits: WallHits | None = None

@@ -173,6 +173,22 @@ class TableSpec:
 
 
 @dataclass(frozen=True)
+class Inspection:
+    """What an inspection of the tank is to know.
+
+    Attributes
+    ----------
+    rule : str or None
+        Name of the rule that it is judged by, as written; None: the usual one.
+    yield_pa : float or None
+        Yield stress of the shell's steel, Pa; None: not given.
+    """
+
+    rule: str | None = None
+    yield_pa: float | None = None
+
+
+@dataclass(frozen=True)
 class Switches:
     """Which corrections are made; one that is off is named in the report.
 

@@ -67,6 +67,8 @@ EXAMPLES_OF_KEYS = {
     "checks.top_z_m": 9.625,
     "checks.circumference_m": 40.892,
     "checks.length_m": 10.0,
+    "inspection.rule": "api_653",
+    "inspection.yield_mpa": 250.0,
     "certificate.number": "0123/2024",
     "certificate.date_of_issue": "2024-06-14",
     "cameras.format_mm": "180; 130",

@@ -78,6 +78,7 @@ SECTION_NOTES = {
     "radii": "the radii of radii.csv: where they come from, and how well they are known",
     "change": "only beside a new survey of some courses: how far the radii may have changed since",
     "checks": "only compared, to tell a slip of the hand: nothing here changes a number",
+    "inspection": "only for tankcal inspect: no capacity depends on it",
     "adjustment": "how bad points are treated, and what holds the frame of a survey",
     "adjustment.camera": "what of the cameras is adjusted: off, camera free, camera weighted,"
     " camera fixed, or the same with block or photo in place of camera",

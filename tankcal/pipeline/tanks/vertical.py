@@ -256,7 +256,7 @@ def _shell(job, wall, switches, uncertain):
         departures=_declared(job),
     )
     features = _functionals(wall, volume) if uncertain else None
-    bearing = _bearing(job, switches)
+    bearing = bearing_inputs(job, switches)
     read_with = wall.read_with(features.weights) if uncertain else {}
     if job.radii is None:  # else all that a survey beside them depends on is in the radii
         read_with = {name: column for name, column in read_with.items() if name in bearing}
@@ -338,7 +338,7 @@ def volume_by_points(job, wall, levels_m):
     return volume.weights_m(np.maximum(levels_m, 0.0)) @ jacobian
 
 
-def _bearing(job, switches):
+def bearing_inputs(job, switches):
     """Declared inputs that the corrections of the shell use."""
     seen = job.strapping is not None or (job.points is not None and job.points.by_inputs)
     outside = job.survey.side == "outside" or bool(seen)

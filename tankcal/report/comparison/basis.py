@@ -2,9 +2,9 @@
 
 from tankcal.report import blocks
 from tankcal.report.comparison import figures
-from tankcal.report.comparison.paper import bearable, iso_day, shortened
 from tankcal.report.comparison.tables import waterfall_of
 from tankcal.report.plain import Column
+from tankcal.report.saved_paper import bearable, iso_day, shortened
 from tankcal.text.digits import NOTHING
 
 SIDES = (Column("what"), Column("former"), Column("new"))

@@ -3,10 +3,10 @@
 from tankcal.report import blocks
 from tankcal.report.comparison import figures
 from tankcal.report.comparison.basis import basis, read_out, sides
-from tankcal.report.comparison.paper import signed_text
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, selected, worst_row
 from tankcal.report.comparison.verdict import legal, signed, verdict
 from tankcal.report.markdown import nodes
+from tankcal.report.saved_paper import signed_text
 from tankcal.text.digits import NOTHING
 
 HALF = 0.5  # the other correlation that E_n is told for

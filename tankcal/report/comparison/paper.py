@@ -1,20 +1,19 @@
 """A comparison on paper: its values in the words of a language."""
 
 from collections import defaultdict
+from typing import ClassVar
 
 from tankcal.job.rule_files import shipped_names, shipped_rule
 from tankcal.record.comparison import COMPARISON
-from tankcal.report import attachments, blocks
 from tankcal.report.comparison.tables import symbol_of
-from tankcal.report.plain import PlainPaper, words_with_part
+from tankcal.report.plain import words_with_part
+from tankcal.report.saved_paper import SavedPaper, bearable, iso_day, signed_text
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 from tankcal.text.languages import DEFAULT
-from tankcal.text.words import load_words, message_sentence
+from tankcal.text.words import load_words
 
 FILE = "comparison.json"
 WORKBOOK = "comparison.xlsx"
-DIGITS_OF_DIGEST = 12
-LONGEST_WORD = 30  # letters of a name in a column of a page
 UNITS = {"C": "degC", "%": "percent", "mm": "image mm"}  # {of the file: of report.numbers}
 DECIMALS = {"C": 1, "kg/m3": 1, "mm": 2, "m": 4, "m3": 4, "%": 3}
 CODES = {  # {value of a reason: group of words that it is looked up in}
@@ -26,7 +25,7 @@ CODES = {  # {value of a reason: group of words that it is looked up in}
 }
 
 
-class ComparisonPaper(PlainPaper):
+class ComparisonPaper(SavedPaper):
     """A `record.comparison.ComparisonFile` as plain data, with the words of a language.
 
     found       as parsed; checked against its schema
@@ -35,6 +34,9 @@ class ComparisonPaper(PlainPaper):
 
     Words are looked up in the group's part under `comparison` first, then in the group itself.
     """
+
+    kind, file = "comparison", FILE
+    attached: ClassVar[dict] = {FILE: "comparison", WORKBOOK: "comparison_workbook"}
 
     def __init__(self, found, language=None, letterhead=None):
         super().__init__(words_with_part(load_words(language or DEFAULT), "comparison"))
@@ -57,44 +59,9 @@ class ComparisonPaper(PlainPaper):
         subject = f"{self.word('page.tank')} {tank}" if tank else self.found["former"]["name"]
         return bearable(subject)
 
-    def head(self, folder=None):
-        """The start of the document, and the head of its first page.
-
-        folder  of the files that the PDF holds inside; None: none
-        """
-        title = self.word("titles.comparison")
-        return [
-            blocks.document(
-                title=f"{title}, {self.subject()}",
-                author=self.letterhead["name"] if self.letterhead else "",
-                date=self._date(),
-                language=self.words["language"]["code"],
-                notice=self.found["notice"],
-                running=[title, self.subject()],
-                footer=self._footer(folder),
-                letterhead=self.letterhead,
-                attachments=self._attachments(folder),
-            ),
-            blocks.masthead(title, self.subject()),
-        ]
-
-    def _date(self):
+    def date(self):
         """The day of the new table, ISO; "" where its date is not known, or is none."""
         return iso_day(self.found["new"]["date"])
-
-    def _footer(self, folder):
-        """Page numbers, and the first digits of the SHA-256 of the comparison that is printed."""
-        made = f"{self.words['page']['footer']} · tankcal {self.found['tankcal']}"
-        if folder is None:
-            return made
-        digest = attachments.sha256((folder / FILE).read_bytes())[:DIGITS_OF_DIGEST]
-        return f"{made} · {self.word('texts.digest', digest=digest)}"
-
-    def _attachments(self, folder):
-        if folder is None:
-            return []
-        described = {name: self.word(f"attached.{key}") for name, key in ATTACHED.items()}
-        return [one.data() for one in attachments.beside(folder, described)]
 
     # ---- values
 
@@ -148,28 +115,6 @@ class ComparisonPaper(PlainPaper):
             return self.plain(value)
         return self.number(value, decimals=2)
 
-    def warning(self, one):
-        """A warning of the file in the language."""
-        said = message_sentence(self.words, one["text"], one["code"], one["values"])
-        place = f"{one['file']}: " if one["file"] else ""
-        return f"{place}{said}"
-
-
-def bearable(text):
-    """A text of a user without words that no column holds: their middle is left out."""
-    return " ".join(map(shortened, str(text).split(" ")))
-
-
-def shortened(name):
-    """A name of at most LONGEST_WORD letters, its middle left out."""
-    half = LONGEST_WORD // 2
-    return name if len(name) <= LONGEST_WORD else f"{name[:half]}…{name[1 - half :]}"
-
-
-def signed_text(value, text):
-    """The text of a number with a plus before it where it is above 0."""
-    return f"+{text}" if value > 0 else text
-
 
 def _variant(values):
     """The end of the word for a reason: of a delivery, with a limit of c, for what was lacking."""
@@ -178,16 +123,3 @@ def _variant(values):
     if values.get("c_limit") is not None:
         return "_with_limit"
     return "_for_lack" if values.get("lacking") else ""
-
-
-ATTACHED = {FILE: "comparison", WORKBOOK: "comparison_workbook"}
-
-
-def iso_day(text):
-    """The date that a text begins with, as text; "" where it begins with none."""
-    from datetime import date
-
-    try:
-        return date.fromisoformat(str(text or "")[:10]).isoformat()
-    except ValueError:
-        return ""

@@ -1,8 +1,8 @@
 """What a comparison decides: the verdict, why, by which rule, and the numbers that it limits."""
 
 from tankcal.report import blocks
-from tankcal.report.comparison.paper import signed_text
 from tankcal.report.plain import Column
+from tankcal.report.saved_paper import signed_text
 from tankcal.text.digits import NOTHING
 
 LEGAL = (

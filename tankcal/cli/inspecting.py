@@ -1,0 +1,132 @@
+"""`tankcal inspect`: plumb, roundness, welds and settlement of a tank by its survey."""
+
+from pathlib import Path
+
+from tankcal.cli.arguments import add_language, positive
+from tankcal.cli.machine import add_json, print_json
+from tankcal.cli.showing import (
+    Progress,
+    language_of_run,
+    prepare_for_small_work,
+    print_paths,
+    say,
+    speak,
+    warn,
+)
+from tankcal.messages import message
+
+MOST_WARNINGS = 10  # that are shown
+NOMINALS = ("drawing", "mean")
+
+
+def add(commands):
+    """The parser of `tankcal inspect`."""
+    inspect = commands.add_parser(
+        "inspect",
+        help="plumb, roundness, welds and settlement of a tank by its survey",
+        description="Inspect an upright tank by the survey that calibrates it: plumb, roundness, "
+        "peaking and banding where it was scanned, settlement where it was levelled; each with its "
+        "U, judged by a rule. It is no part of the certificate. docs/inspection.md says how.",
+        epilog="exit status: 0 done, whatever the verdict; 2 the input must be mended; 3 the "
+        "survey has no sound solution.",
+    )
+    inspect.add_argument(
+        "source", metavar="JOB", help="a job, a record.json, or a folder of results"
+    )
+    inspect.add_argument(
+        "--rule", metavar="RULE", help="a rule by its name, or a .toml file (default: api_653)"
+    )
+    inspect.add_argument(
+        "--nominal",
+        choices=NOMINALS,
+        default=NOMINALS[0],
+        help="what radii are compared with: the drawing's, or their own mean",
+    )
+    inspect.add_argument(
+        "--settlement",
+        metavar="FILE",
+        help="elevations round the foot (default: settlement.csv beside the job, if any)",
+    )
+    inspect.add_argument(
+        "--edges",
+        metavar="FILE",
+        help="levelled lines across the bottom (default: edge_profiles.csv beside the job, if any)",
+    )
+    inspect.add_argument(
+        "--yield-mpa",
+        metavar="MPA",
+        type=positive,
+        help="yield stress of the steel, for the limits of settlement (default: as the job says)",
+    )
+    inspect.add_argument(
+        "--out", metavar="DIR", help="write inspection.json and papers there, all or nothing"
+    )
+    add_language(inspect)
+    inspect.add_argument("--quiet", action="store_true", help="no progress, only problems")
+    add_json(inspect)
+    inspect.set_defaults(command=_inspect)
+
+
+def _inspect(options):
+    prepare_for_small_work()
+    speak(options.language)
+    from tankcal.inspection.inspecting import Asked, inspect_files
+    from tankcal.record.inspection import plain_of_inspection
+
+    if options.out is not None:
+        from tankcal.report.inspection import refuse_foreign, write_inspection
+
+        refuse_foreign(options.out)
+    show = Progress(options.quiet or options.machine)
+    show.step(message("inspect_reading", "inspecting {source}", source=options.source))
+    asked = Asked(
+        options.source,
+        rule=options.rule,
+        nominal=options.nominal,
+        settlement=options.settlement,
+        edges=options.edges,
+        yield_pa=None if options.yield_mpa is None else 1e6 * options.yield_mpa,
+    )
+    found = plain_of_inspection(inspect_files(asked, show.step, show.part))
+    written = ()
+    if options.out is not None:
+        written = write_inspection(found, options.out, language_of_run(), show.step)
+    show.end()
+    if options.machine:
+        print_json(exit_status=0, **found)
+        return
+    _tell(found)
+    if written:
+        print_paths(Path(options.out), [path.name for path in written])
+
+
+def _tell(found):
+    """Warnings, the rule, then a line for each check."""
+    from tankcal.report.inspection import InspectionPaper
+
+    paper = InspectionPaper(found, language_of_run())
+    warn(paper.warning(one) for one in found["warnings"][:MOST_WARNINGS])
+    rule = paper.found["rule"]
+    say(message("inspect_by", "judged by {rule} ({file})", rule=rule["name"], file=rule["file"]))
+    if not rule["verified"]:
+        say(message("inspect_not_read", "* not read in the text: {remark}", remark=rule["remark"]))
+    for one in found["checks"]:
+        say(_line(paper, one))
+
+
+def _line(paper, one):
+    """One check: its name, the value with U, the limit, the verdict, where it is."""
+    name, verdict = paper.check_name(one["code"]), paper.verdict(one)
+    if one["value"] is None:
+        return f"{name}: {paper.remark(one) or verdict}"
+    values = {
+        "check": name,
+        "value": paper.value(one),
+        "U": paper.in_unit(one, one["U"]) or "?",
+        "limit": paper.limit(one) or "-",
+        "verdict": verdict,
+        "place": paper.place(one),
+    }
+    return message(
+        "inspect_check", "{check}: {value}, U {U}, limit {limit}: {verdict} ({place})", **values
+    )

@@ -1,0 +1,392 @@
+"""settlement.csv and edge_profiles.csv: what was levelled round a tank and across its bottom.
+
+Every problem of a file goes to the log; what is read is in SI units, points by azimuth.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import chi2
+
+from tankcal.adjust import ALPHA
+from tankcal.errors import SolutionError
+from tankcal.geometry.circles import fit_circle
+from tankcal.inspection.epochs import LEAST_POINTS, SHOWN, WIDEST_GAP_DEG, Epoch, Levelling
+from tankcal.inspection.out_of_plane import arcs_after
+from tankcal.job.checking import missing_beside, tiny_sd
+from tankcal.job.contract.shorthand import number, positive
+from tankcal.job.entries import read_columns
+from tankcal.job.fields import Field
+from tankcal.job.folder import read_csv
+from tankcal.job.tables import read_bytes
+from tankcal.messages import list_some, message
+
+SETTLEMENT = (
+    Field("point", "name", "name of the point, the same in all epochs", required=True),
+    number("azimuth_deg", "of the point, clockwise from +y, degrees", -360, 360),
+    number("x_m", "of the point, in place of azimuth_deg, metres", -1e7, 1e7),
+    number("y_m", "of the point, in place of azimuth_deg, metres", -1e7, 1e7),
+    number("elevation_m", "levelled, up, metres", -1e4, 1e4, required=True),
+    positive("s_mm", "standard deviation of this elevation, millimetres", 100, in_full=True),
+    Field("epoch", "name", "of the levelling, such as 2024-05-31; blank in all rows: one"),
+)
+EDGE_PROFILES = (
+    number("azimuth_deg", "of the radial line, clockwise from +y, degrees", -360, 360,
+           required=True),
+    number("radius_m", "from the tank's centre, metres", 0, 200, required=True),
+    number("z_m", "of the bottom, up, metres", -1e4, 1e4, required=True),
+    positive("s_mm", "standard deviation of this elevation, millimetres", 100, in_full=True),
+    number("weld_deg", "between the lap weld and the radial line, degrees; blank: 90, parallel to"
+           " the shell", 0, 90),
+)  # fmt: skip
+ONE_EPOCH = "1"  # the name of an epoch that has none
+LEAST_READINGS = 5
+MOST_POINTS, MOST_EPOCHS, MOST_READINGS, MOST_LINES = 1000, 50, 500, 200
+LONGEST_START = 10_000  # bytes that the heading is looked for in
+MOST_RISE_M = 2.0  # of one epoch, or along one profile: more is another unit
+LEAST_SD_MM = 0.01
+SAME_PLACE_DEG, SAME_AZIMUTH_DEG = 1.0, 0.05  # of one point's rows; of two points
+OFF_CIRCLE = 0.05  # of the radius
+
+
+@dataclass(frozen=True)
+class RadialLine:
+    """Elevations of the bottom along one radial line, by radius.
+
+    Attributes
+    ----------
+    azimuth_deg : float
+        From 0 to 360, clockwise from +y.
+    radius_m, z_m : ndarray, shape (n,)
+    sd_m : ndarray, shape (n,), or None
+        None: not given.
+    weld_deg : float or None
+        Between the lap weld and the radial line; None: taken as parallel to the shell.
+    row : int
+        Its first in the file.
+    """
+
+    azimuth_deg: float
+    radius_m: np.ndarray
+    z_m: np.ndarray
+    sd_m: np.ndarray | None
+    weld_deg: float | None
+    row: int
+
+
+def read_settlement(path, log):
+    """Levelling of settlement.csv; None after telling `log` every problem of it."""
+    before, values = len(log.problems), _read(path, SETTLEMENT, log)
+    if values is None:
+        return None
+    epochs = _epochs_of_rows(values, log)
+    placed = _azimuths(values, log)
+    if len(log.problems) > before:
+        return None
+    azimuth, radius_m = placed
+    places = _places(values, azimuth, log)
+    groups = _repeats(values, epochs)
+    given = values.of("s_mm")[0] is not None
+    pooled, dof = _pooled_sd(values, groups)
+    if given:
+        _tell_disagreeing(values, groups, log)
+    sd_m = values.numbers("s_mm") / 1000 if given else np.full(len(epochs), pooled)
+    made = [_epoch(name, values, groups, places, sd_m) for name in dict.fromkeys(epochs)]
+    for one in made:
+        _check_epoch(one, values.file, log)
+    if len(log.problems) > before:
+        return None
+    if not (given or dof):
+        text = message("levels_no_sd", "neither s_mm nor a point that was levelled twice: no"
+                       " uncertainty is known, so nothing can be said to pass")  # fmt: skip
+        log.warning(values.file, text)
+    dof = np.inf if given else float(dof)
+    return Levelling(values.file, tuple(_in_order(made)), given, dof, radius_m)
+
+
+def _epoch(name, values, groups, places, sd_m):
+    """Epoch of its rows: points by azimuth, repeats as their mean weighted by their sds."""
+    points = sorted((p for e, p in groups if e == name), key=lambda p: places.get(p, 0.0))
+    rows = [groups[name, point] for point in points]
+    return Epoch(
+        name=name,
+        since=None,
+        points=tuple(points),
+        azimuth_rad=np.radians([places.get(point, np.nan) for point in points]),
+        z_m=np.array([_mean(values, one, sd_m) for one in rows]),
+        u_m=np.array([np.sum(sd_m[one] ** -2.0) ** -0.5 for one in rows]),
+    )
+
+
+def read_edge_profiles(path, log):
+    """RadialLines of edge_profiles.csv; None after telling `log` every problem of it."""
+    before, values = len(log.problems), _read(path, EDGE_PROFILES, log)
+    if values is None:
+        return None
+    azimuth = values.numbers("azimuth_deg") % 360
+    lines, angles = [], dict.fromkeys(azimuth.tolist())
+    if len(angles) > MOST_LINES:
+        text = message("edge_many_lines", "{count} radial lines; expected at most {most}: has each"
+                       " reading an azimuth of its own?", count=len(angles),
+                       most=MOST_LINES)  # fmt: skip
+        log.problem(values.file, text, None, "azimuth_deg")
+        return None
+    for one in angles:
+        rows = np.flatnonzero(azimuth == one)
+        rows = rows[np.argsort(values.numbers("radius_m")[rows], kind="stable")]
+        lines.append(_radial_line(values, rows, log))
+    return None if len(log.problems) > before else tuple(lines)
+
+
+def _read(path, fields, log):
+    """ColumnValues of a CSV file, without problems and with rows, or None."""
+    path = Path(path)
+    before, data = len(log.problems), read_bytes(path, log)
+    if data is None:
+        return None
+    table = read_csv(path.name, data, *_marks(data), log)
+    if table is None:
+        return None
+    values = read_columns(None, table, log, fields)
+    if values.is_empty:
+        log.problem(path.name, message("levels_no_rows", "no rows; expected levelled points"))
+    sds = [one for one in values.of("s_mm") if one is not None]
+    if sds and max(sds) < LEAST_SD_MM:
+        log.problem(path.name, tiny_sd("mm", max(sds)), values.rows[0], "s_mm")
+    return None if len(log.problems) > before else values
+
+
+def _marks(data):
+    """(separator, decimal mark) by the heading of a CSV file: Brazilian Excel writes ; and ,"""
+    lines = (line.strip() for line in data[:LONGEST_START].splitlines())
+    heading = next((line for line in lines if line and not line.startswith(b"#")), b"")
+    return (";", ",") if b";" in heading else (",", ".")
+
+
+# ---- settlement.csv
+
+
+def _epochs_of_rows(values, log):
+    """Name of the epoch of each row; blanks among names, and two spellings, are told."""
+    names, first = values.of("epoch"), {}
+    if not any(names):
+        return [ONE_EPOCH] * len(names)
+    for row, name in zip(values.rows, names, strict=True):
+        if name is None:
+            text = message("levels_no_epoch", "blank; expected the epoch, as in other rows")
+            log.problem(values.file, text, row, "epoch")
+            continue
+        known, known_row = first.setdefault(name.casefold(), (name, row))
+        if known != name:
+            text = message("levels_epoch_spelt", "found {name!r}; expected {known!r}, as in row"
+                           " {first_row}", name=name, known=known,
+                           first_row=known_row)  # fmt: skip
+            log.problem(values.file, text, row, "epoch")
+    if len(first) > MOST_EPOCHS:
+        text = message("levels_many_epochs", "{count} epochs; expected at most {most}",
+                       count=len(first), most=MOST_EPOCHS)  # fmt: skip
+        log.problem(values.file, text, None, "epoch")
+    return names
+
+
+def _azimuths(values, log):
+    """((rows,) azimuths in degrees, nan where blank; radius of their circle or None)."""
+    azimuth, x, y = (values.numbers(name) for name in ("azimuth_deg", "x_m", "y_m"))
+    has_azimuth, has_x, has_y = (values.columns[name] is not None
+                                 for name in ("azimuth_deg", "x_m", "y_m"))  # fmt: skip
+    if has_azimuth and (has_x or has_y):
+        text = message("levels_two_places", "given together with {other}; expected only one of"
+                       " them: azimuths, or coordinates", other="azimuth_deg")  # fmt: skip
+        log.problem(values.file, text, None, "x_m" if has_x else "y_m")
+    elif has_x != has_y:
+        name, other = ("x_m", "y_m") if has_y else ("y_m", "x_m")
+        log.problem(values.file, missing_beside(other), None, name)
+    elif not (has_azimuth or has_x):
+        text = message("levels_nowhere", "missing; expected the azimuths of the points, or x_m and"
+                       " y_m")  # fmt: skip
+        log.problem(values.file, text, None, "azimuth_deg")
+    elif has_azimuth:
+        return azimuth, None
+    else:
+        return _on_circle(values, x, y, log)
+    return None
+
+
+def _on_circle(values, x, y, log):
+    """Azimuths about the centre of the circle through all points, and its radius."""
+    known = np.isfinite(x) & np.isfinite(y)
+    for row, one_x, one_y in zip(values.rows, x, y, strict=True):
+        if np.isfinite(one_x) != np.isfinite(one_y):
+            name, other = ("x_m", "y_m") if np.isnan(one_x) else ("y_m", "x_m")
+            log.problem(values.file, missing_beside(other), row, name)
+    xy = np.column_stack([x, y])[known]
+    try:
+        circle = fit_circle(xy, np.broadcast_to(np.eye(2) * 1e-4, (len(xy), 2, 2)))
+    except (SolutionError, ValueError):
+        text = message("levels_no_circle", "no circle goes through the points; expected"
+                       " coordinates of points round the tank")  # fmt: skip
+        log.problem(values.file, text, None, "x_m")
+        return None
+    off = np.abs(circle.residuals_m)
+    for row, one in zip(np.array(values.rows)[known], off, strict=True):
+        if one > OFF_CIRCLE * circle.radius_m:
+            text = message("levels_off_circle", "{off:.3g} m off the circle through all points,"
+                           " radius {radius:.4g} m; expected points at the shell",
+                           off=float(one), radius=circle.radius_m)  # fmt: skip
+            log.problem(values.file, text, int(row), "x_m")
+    azimuth = np.degrees(np.arctan2(x - circle.x_m, y - circle.y_m))
+    return azimuth, circle.radius_m
+
+
+def _places(values, azimuth, log):
+    """{point: azimuth in degrees, 0 to 360}, the mean of its rows; contradictions are told."""
+    rows_of = {}
+    for i, point in enumerate(values.of("point")):
+        rows_of.setdefault(point, []).append(i)
+    places = {}
+    for point, rows in rows_of.items():
+        given = [i for i in rows if np.isfinite(azimuth[i])]
+        if not given:
+            text = message("levels_point_nowhere", "point {point!r} has no place in any row;"
+                           " expected its azimuth, or x_m and y_m, in one",
+                           point=point)  # fmt: skip
+            log.problem(values.file, text, values.rows[rows[0]], "point")
+            continue
+        first = azimuth[given[0]]
+        turned = [(azimuth[i] - first + 180) % 360 - 180 for i in given]
+        for i, off in zip(given, turned, strict=True):
+            if abs(off) > SAME_PLACE_DEG:
+                text = message("levels_moved", "point {point!r} is at {azimuth:.2f} degrees here,"
+                               " at {first:.2f} in row {first_row}; expected one place",
+                               point=point, azimuth=float(azimuth[i]) % 360,
+                               first=float(first) % 360,
+                               first_row=values.rows[given[0]])  # fmt: skip
+                log.problem(values.file, text, values.rows[i], "point")
+        places[point] = float(first + np.mean(turned)) % 360
+    return places
+
+
+def _repeats(values, epochs):
+    """{(epoch, point): its rows}."""
+    groups = {}
+    for i, pair in enumerate(zip(epochs, values.of("point"), strict=True)):
+        groups.setdefault(pair, []).append(i)
+    return groups
+
+
+def _pooled_sd(values, groups):
+    """Standard deviation of one reading by all repeats, m, and its degrees of freedom.
+
+    Repeats that are all the same show no more than that a row was copied: nan and 0.
+    """
+    z = values.numbers("elevation_m")
+    dof = sum(len(rows) - 1 for rows in groups.values())
+    if not dof:
+        return np.nan, 0
+    squares = sum(np.sum((z[rows] - np.mean(z[rows])) ** 2) for rows in groups.values())
+    return (float(np.sqrt(squares / dof)), dof) if squares > 0 else (np.nan, 0)
+
+
+def _mean(values, rows, sd_m):
+    """Elevation of the rows of one point, weighted by their sds where these are known."""
+    weights = None if np.isnan(sd_m[rows[0]]) else sd_m[rows] ** -2.0
+    return np.average(values.numbers("elevation_m")[rows], weights=weights)
+
+
+def _tell_disagreeing(values, groups, log):
+    """A warning where repeats differ by more than s_mm lets them (0.1 %)."""
+    z, sd = values.numbers("elevation_m"), values.numbers("s_mm") / 1000
+    dof = sum(len(rows) - 1 for rows in groups.values())
+    if not dof:
+        return
+    weighed = sum(
+        np.sum(((z[rows] - _mean(values, rows, sd)) / sd[rows]) ** 2) for rows in groups.values()
+    )
+    if chi2.sf(weighed, dof) < ALPHA:
+        text = message("levels_repeats_off", "points that were levelled again differ {times:.1f}"
+                       " times as much as s_mm says",
+                       times=float(np.sqrt(weighed / dof)))  # fmt: skip
+        log.warning(values.file, text, None, "s_mm")
+
+
+def _check_epoch(epoch, file, log):
+    """Problems of one epoch: too few points, two at one place, half of the round, another unit."""
+    if len(epoch.points) < LEAST_POINTS:
+        text = message("levels_few_points", "epoch {epoch!r} has {count} points; expected at least"
+                       " {least}", epoch=epoch.name, count=len(epoch.points),
+                       least=LEAST_POINTS)  # fmt: skip
+        log.problem(file, text)
+        return
+    if len(epoch.points) > MOST_POINTS:
+        text = message("levels_many_points", "epoch {epoch!r} has {count} points; expected at most"
+                       " {most}", epoch=epoch.name, count=len(epoch.points),
+                       most=MOST_POINTS)  # fmt: skip
+        log.problem(file, text)
+        return
+    gaps = np.degrees(arcs_after(epoch.azimuth_rad))
+    for i in np.flatnonzero(gaps < SAME_AZIMUTH_DEG):
+        text = message("levels_same_azimuth", "points {point!r} and {other!r} of epoch {epoch!r}"
+                       " are both at {azimuth:.2f} degrees; expected two places, or one name",
+                       point=epoch.points[i], other=epoch.points[(i + 1) % len(epoch.points)],
+                       epoch=epoch.name,
+                       azimuth=float(np.degrees(epoch.azimuth_rad[i])))  # fmt: skip
+        log.problem(file, text)
+    widest = int(np.argmax(gaps))
+    if gaps[widest] > WIDEST_GAP_DEG:
+        text = message("levels_half_round", "epoch {epoch!r} has no point for {gap:.0f} degrees"
+                       " after {point!r}; expected points all round the tank", epoch=epoch.name,
+                       gap=float(gaps[widest]), point=epoch.points[widest])  # fmt: skip
+        log.problem(file, text)
+    if np.ptp(epoch.z_m) > MOST_RISE_M:
+        text = message("levels_other_unit", "elevations of epoch {epoch!r} differ by up to"
+                       " {rise:.4g} m; expected metres, {most:g} m at most: are they in"
+                       " millimetres?", epoch=epoch.name, rise=float(np.ptp(epoch.z_m)),
+                       most=MOST_RISE_M)  # fmt: skip
+        log.problem(file, text, None, "elevation_m")
+
+
+def _in_order(epochs):
+    """Epochs by date where all names are dates such as 2024, 2024-05 or 2024-05-31."""
+    is_date = all(len(one.name) >= 4 and one.name.replace("-", "").isdecimal() for one in epochs)
+    return sorted(epochs, key=lambda one: one.name) if is_date else epochs
+
+
+# ---- edge_profiles.csv
+
+
+def _radial_line(values, rows, log):
+    """RadialLine of the rows of one azimuth, with its problems told."""
+    radius, z = values.numbers("radius_m")[rows], values.numbers("z_m")[rows]
+    row, azimuth = values.rows[min(rows)], float(values.numbers("azimuth_deg")[rows[0]] % 360)
+    if len(rows) < LEAST_READINGS:
+        text = message("edge_few_readings", "the line at {azimuth:g} degrees has {count} readings;"
+                       " expected at least {least}", azimuth=azimuth, count=len(rows),
+                       least=LEAST_READINGS)  # fmt: skip
+        log.problem(values.file, text, row, "azimuth_deg")
+    if len(rows) > MOST_READINGS:
+        text = message("edge_many_readings", "the line at {azimuth:g} degrees has {count} readings;"
+                       " expected at most {most}", azimuth=azimuth, count=len(rows),
+                       most=MOST_READINGS)  # fmt: skip
+        log.problem(values.file, text, row, "azimuth_deg")
+    for i in np.flatnonzero(np.diff(radius) == 0):
+        text = message("edge_same_radius", "the line at {azimuth:g} degrees has {radius:g} m"
+                       " already; expected each radius once", azimuth=azimuth,
+                       radius=float(radius[i]))  # fmt: skip
+        log.problem(values.file, text, values.rows[rows[i + 1]], "radius_m")
+    if np.ptp(z) > MOST_RISE_M:
+        text = message("edge_other_unit", "elevations of the line at {azimuth:g} degrees differ by"
+                       " up to {rise:.4g} m; expected metres, {most:g} m at most: are they in"
+                       " millimetres?", azimuth=azimuth, rise=float(np.ptp(z)),
+                       most=MOST_RISE_M)  # fmt: skip
+        log.problem(values.file, text, row, "z_m")
+    welds = [one for one in np.array(values.of("weld_deg"))[rows] if one is not None]
+    if len(set(welds)) > 1:
+        text = message("edge_two_welds", "the line at {azimuth:g} degrees has {angles} degrees;"
+                       " expected one angle of its weld", azimuth=azimuth,
+                       angles=list_some([f"{one:g}" for one in dict.fromkeys(welds)],
+                                        SHOWN))  # fmt: skip
+        log.problem(values.file, text, row, "weld_deg")
+    given = values.of("s_mm")[0] is not None
+    sd_m = values.numbers("s_mm")[rows] / 1000 if given else None
+    return RadialLine(azimuth, radius, z, sd_m, float(welds[0]) if welds else None, row)
