@@ -53,7 +53,7 @@ def _plane(paper, one):
         "b": paper.number(one["b_mm"], mm, **two),
         "azimuth": paper.azimuth(one["highest_azimuth_deg"]),
         "tilt": f"{paper.number(one['tilt_mm_per_m'], **two)}\N{NO-BREAK SPACE}mm/m",
-        "R2": paper.number(one["R2"], decimals=4),
+        "share": paper.number(one["R2"], decimals=4),
         "a": paper.number(one["a_mm"], mm, **two),
         "p": paper.number(one["p_mm"], mm, **two),
         "q": paper.number(one["q_mm"], mm, **two),
