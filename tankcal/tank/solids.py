@@ -71,9 +71,9 @@ class LyingTank(Part):
     dip_direction: str = "plumb"
 
     def __post_init__(self):
-        _above_zero("width", self.width_m)
-        _above_zero("height", self.height_m)
-        _above_zero("length", self.length_m)
+        above_zero("width", self.width_m)
+        above_zero("height", self.height_m)
+        above_zero("length", self.length_m)
         if self.dip_direction not in ("plumb", "square"):
             raise SolutionError(f"dip direction {self.dip_direction!r}: expected plumb or square")
         if not np.isfinite(self.tilt) or not np.isfinite(self.roll_rad):
@@ -207,7 +207,7 @@ class LyingTank(Part):
 
     def _liquid_m(self, levels_m, s):
         """(rows,) height of the liquid above the axis at s, in the round tank of equal area."""
-        levels = _inside(levels_m, self.top_m)
+        levels = inside_dips(levels_m, self.top_m)
         above_dip_zero = self._stretch * levels - self.tilt * (s - self.dip_from_a_m)
         return self._squeeze * above_dip_zero - self._radius_m
 
@@ -277,7 +277,7 @@ class Sphere(Part):
     diameter_m: float
 
     def __post_init__(self):
-        _above_zero("diameter", self.diameter_m)
+        above_zero("diameter", self.diameter_m)
 
     @property
     def top_m(self):
@@ -291,12 +291,12 @@ class Sphere(Part):
 
     def volume_m3(self, levels_m):
         """(rows,) volume below each dip."""
-        d = _inside(levels_m, self.top_m)
+        d = inside_dips(levels_m, self.top_m)
         return np.pi * d**2 * (1.5 * self.diameter_m - d) / 3
 
     def area_m2(self, levels_m):
         """(rows,) free surface, pi d (D - d)."""
-        d = _inside(levels_m, self.top_m)
+        d = inside_dips(levels_m, self.top_m)
         return np.pi * d * (self.diameter_m - d)
 
     def derivatives(self, levels_m):
@@ -307,7 +307,7 @@ class Sphere(Part):
         datum            height of the liquid at a given dip
         scale            of the diameter, but not of the dips
         """
-        d = _inside(levels_m, self.top_m)
+        d = inside_dips(levels_m, self.top_m)
         by_diameter = np.pi * d**2 / 2
         return {
             "diameter": by_diameter,
@@ -317,7 +317,8 @@ class Sphere(Part):
         }
 
 
-def _inside(levels_m, top_m):
+def inside_dips(levels_m, top_m):
+    """(rows,) dips between 0 and the top; HeightError for one that is outside."""
     levels = np.asarray(levels_m, dtype=float)
     slack = ROUNDING * top_m
     outside = ~((levels >= -slack) & (levels <= top_m + slack))
@@ -333,6 +334,7 @@ def _inside(levels_m, top_m):
     return levels
 
 
-def _above_zero(name, length_m):
+def above_zero(name, length_m):
+    """Raise SolutionError for a length that is not above zero."""
     if not 0 < length_m < np.inf:
         raise SolutionError(f"{name} {length_m:g} m: expected a length above zero")
