@@ -61,7 +61,7 @@ def _new(options):
     write_starter(directory, *form)
     if is_filled_by_pen(options.survey):
         sheets = directory / FILE
-        write_field_sheets(sheets, options.survey, options.language)
+        write_field_sheets(sheets, options.survey, options.language, options.kind)
         say(message("wrote_field_sheets", "wrote {file}: print it for the crew", file=str(sheets)))
     say(
         message(

@@ -142,12 +142,15 @@ class FittedEllipsoid:
         counts.
     residuals_m : ndarray, shape (n,)
         Length of the ellipsoid less that measured.
+    precision : ndarray, shape (n, n)
+        Of the lengths, 1/m2, less what the ellipsoid takes up of them.
     """
 
     unknowns: np.ndarray
     weights: np.ndarray
     by_prior: np.ndarray
     residuals_m: np.ndarray
+    precision: np.ndarray
 
     @property
     def axes_m(self):
@@ -213,6 +216,7 @@ def fit_ellipsoid(azimuth_rad, length_m, covariance_m2, prior):
         weights=weights[:, :count],
         by_prior=weights[:, count:] * sds,
         residuals_m=found - length,
+        precision=(np.linalg.inv(whole) - weighted @ weights)[:count, :count],
     )
 
 

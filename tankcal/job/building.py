@@ -10,8 +10,10 @@ from tankcal.job.checks.extent import has_radii, has_survey, is_metered, is_sigh
 from tankcal.job.clouds import make_clouds
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.contract.clouds import KINDS as OF_CLOUDS
+from tankcal.job.contract.great_circles import BESIDE as BESIDE_CIRCLES
 from tankcal.job.covariance import OF_RADII, read_covariance
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
+from tankcal.job.great_circles import make_great_circles
 from tankcal.job.hits import make_hits
 from tankcal.job.lines import make_lines
 from tankcal.job.liquid import make_metering
@@ -27,6 +29,7 @@ from tankcal.job.tables import (
     RADII_COVARIANCE_FILE,
     RADII_TABLES,
     REGISTERS,
+    SPHERE_TABLES,
     STRAPPING_TABLES,
     SURVEY_TABLES,
     TABLES,
@@ -54,7 +57,8 @@ def job_of(raw, log, is_whole=True):
         measurements = make_measurements(values, tables, registers)
     if not is_whole:
         return make_frame(raw, values, tables, measurements, tuple(log.warnings))
-    strapping = make_strapping(values, tables, registers)
+    is_upright = values["tank"]["kind"] == "vertical"
+    strapping = make_strapping(values, tables, registers) if is_upright else None
     made = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
     lines, hits = make_lines(tables, registers), make_hits(tables, registers)
     tangents = make_tangents(tables, registers)
@@ -71,6 +75,7 @@ def job_of(raw, log, is_whole=True):
         liquid=liquid,
         radii=radii,
         change=change,
+        great_circles=make_great_circles(tables, registers),
     )
 
 
@@ -85,6 +90,8 @@ def _read_tables(raw, registers, is_whole, log):
         allowed += SURVEY_TABLES
     if kind == "vertical":
         allowed += STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + RADII_TABLES
+    if kind == "sphere":
+        allowed += SPHERE_TABLES + BESIDE_CIRCLES
     if kind in OF_CLOUDS:
         allowed += CLOUD_TABLES
     tables = {"clouds": _cloud_table(raw, registers, kind, log)}

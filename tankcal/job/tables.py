@@ -27,13 +27,14 @@ STRAPPING_TABLES = (
     *("circumferences", "obstructions", "thickness", "tape_checks"),
     *("lines", "offsets"),
 )
+SPHERE_TABLES = ("great_circles",)
 HITS_TABLES = ("wall_hits", "control_readings")
 TANGENT_TABLES = ("tangents",)
 CLOUD_TABLES = ("scan_targets",)
 LIQUID_TABLES = ("liquid",)
 RADII_TABLES = ("radii",)
 TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + CLOUD_TABLES
-TABLES += LIQUID_TABLES + RADII_TABLES + SURVEY_TABLES
+TABLES += LIQUID_TABLES + RADII_TABLES + SPHERE_TABLES + SURVEY_TABLES
 REGISTERS = {  # what each lists
     "cameras": "camera",
     "instruments": "instrument",

@@ -1,6 +1,6 @@
 """Field sheets of a starter job: its tables of readings as a crew fills them in by pen."""
 
-from tankcal.job.contract import COLUMNS, SURVEYS
+from tankcal.job.contract import COLUMNS, tables_of_survey
 from tankcal.job.starter.form import DECLARED, METERED, OF_SHELLS
 from tankcal.job.starter.texts import parted, texts_in
 from tankcal.report import blocks
@@ -18,6 +18,7 @@ FORMS = (  # tables of each, read in one go, and the rows that a sheet has room 
     (("wall_hits",), 30),
     (("control_readings",), 24),
     (("circumferences",), 15),
+    (("great_circles",), 15),
     (("obstructions",), 9),
     (("thickness",), 8),
     (("tape_checks",), 4),
@@ -45,7 +46,7 @@ def is_filled_by_pen(survey):
     return survey in BY_PEN
 
 
-def write_field_sheets(path, survey, language):
+def write_field_sheets(path, survey, language, kind="vertical"):
     """Write the field sheets of a survey as a PDF.
 
     Parameters
@@ -56,14 +57,16 @@ def write_field_sheets(path, survey, language):
         "strapping", "reference-line", "wall-hits", "tangents" or "liquid".
     language : str
         One of `languages.LANGUAGES`.
+    kind : str, optional
+        Of the tank.
     """
     from tankcal.report.pdf import pdf
 
-    found = sheets(survey, language)
+    found = sheets(survey, language, kind)
     path.write_bytes(pdf([block.data for block in found], path.parent))
 
 
-def sheets(survey, language):
+def sheets(survey, language, kind="vertical"):
     """The blocks of the field sheets."""
     texts = texts_in(language)
     paper = PlainPaper(texts.words)
@@ -82,7 +85,8 @@ def sheets(survey, language):
     if survey == METERED:
         found.append(blocks.paragraph(paper.word("forms.batches")))
         found += [*_meters(paper, texts), *_valves(paper)]
-    forms = [(names, rows) for names, rows in FORMS if set(names) <= set(SURVEYS[survey])]
+    tables = tables_of_survey(kind, survey)
+    forms = [(names, rows) for names, rows in FORMS if set(names) <= set(tables)]
     if any(_is_angle(field) for names, _ in forms for field in _columns(names)):
         found.append(blocks.paragraph(paper.word("forms.angles")))
     for names, rows in forms:

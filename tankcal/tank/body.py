@@ -140,6 +140,9 @@ class SolidPart(Part):
         How that wall departs from the solid, with what the survey leaves uncertain of its volumes.
     unused : tuple of str
         Names of the solid's inputs that have no meaning in this job.
+    read_with : dict
+        {input: (nodes,) derivative of the volumes at the form's nodes}, of inputs that the readings
+        of the survey depend on: the temperature of a tape that has that of the shell.
     """
 
     solid: Part
@@ -150,6 +153,7 @@ class SolidPart(Part):
     factors: tuple[Factor, ...] = ()
     form: SurveyedForm | None = None
     unused: tuple[str, ...] = ()
+    read_with: dict = field(default_factory=dict)
 
     @property
     def top_m(self):
@@ -187,6 +191,9 @@ class SolidPart(Part):
             found["expansion"] = (self.scale - 1) / self.expansion_per_k * by_length
         if "diameter" in self.surveyed:
             found["offset"] = 2 * found["diameter"]
+        for name, column in self.read_with.items():
+            by_readings = self.form.at(self._shares(levels_m)) @ column
+            found[name] = found.get(name, 0.0) + by_readings
         without = {*self.unused, *self.surveyed}
         return {name: one for name, one in found.items() if name not in without}
 

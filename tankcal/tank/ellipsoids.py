@@ -144,7 +144,7 @@ class Membrane:
 class PressedSphere(Part):
     """A sphere, or nearly one, that its pressure widens, from the survey day to the table's dip.
 
-        dr / r = p r (1 - nu) / (2 E t),      p = gas + rho g h^2 / (4 r) less the same of the survey
+        dr / r = p r (1 - nu) / (2 E t),      p = gas + rho g h^2 / (4 r), less that of the survey
 
     rho g h^2 / (4 r) is the mean pressure of a liquid of depth h over the whole wall. By the
     theorem of Betti it gives the change of the whole volume as the membrane theory does, of a

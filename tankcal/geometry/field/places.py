@@ -18,6 +18,7 @@ WRAPS = np.arange(-2, 3)  # turns of a circumference that a short covariance is 
 CELL_M, LARGEST_CELL_M = 0.15, 120  # along the axis; cells of it at most
 AROUND = 144  # cells around a cylinder
 DEGREES = np.arange(2, 161)  # of the Legendre polynomials of a sphere's departures
+AT_EQUATOR = np.polynomial.legendre.legvander(np.zeros(1), DEGREES[-1])[0, 2:]  # P_l(0)
 MOST_SITES, CELL_GROWTH = 600, 1.15  # of more points the means of neighbours count
 
 
@@ -196,13 +197,47 @@ class OnSphere:
 
         functionals  (f, degrees) what each makes of P_l of the angle from the bottom
         """
-        shares = degree_shares(one, self.radius_m)
+        return self.by_nadir(functionals * degree_shares(one, self.radius_m))
+
+    def by_nadir(self, coefficients):
+        """(f, n) sums of coefficients (f, degrees) times P_l of the places' angles from below."""
         nadir = np.polynomial.legendre.legvander(-self.direction[:, 2], DEGREES[-1])[:, 2:]
-        return (functionals * shares) @ nadir.T
+        return coefficients @ nadir.T
 
     def within(self, one, functionals):
         """(f, f) covariance of functionals by one departure itself."""
         return (functionals * degree_shares(one, self.radius_m)) @ functionals.T
+
+
+@dataclass(frozen=True)
+class OnGreatCircles:
+    """Mean radii of great circles of a sphere, known by the normals (n, 3) of their planes.
+
+    The mean of P_l of the angle from a place, over a great circle, is P_l(0) times that of the
+    angle from the place to the normal. What an ellipsoid has, the degree 2, is no departure.
+    """
+
+    radius_m: float
+    normal: np.ndarray
+    departures = tuple(one for one in OF_SPHERES if one.shape != "zonal")
+
+    def covariance(self, one):
+        """(n, n) of one departure of unit variance between the means."""
+        shares = self._shares(one) * AT_EQUATOR**2
+        return _zonal(np.clip(self.normal @ self.normal.T, -1.0, 1.0), shares)
+
+    def across(self, one, functionals):
+        """(f, n) covariance of functionals with the means, as `OnSphere.across`."""
+        return OnSphere(self.radius_m, self.normal).by_nadir(
+            functionals * self._shares(one) * AT_EQUATOR
+        )
+
+    def within(self, one, functionals):
+        """(f, f) covariance of functionals by one departure itself."""
+        return (functionals * self._shares(one)) @ functionals.T
+
+    def _shares(self, one):
+        return np.where(DEGREES == 2, 0.0, degree_shares(one, self.radius_m))
 
 
 def degree_shares(one, radius_m):
@@ -212,6 +247,14 @@ def degree_shares(one, radius_m):
     else:
         found = (2 * DEGREES + 1) * (DEGREES**2 + (radius_m / one.width_m) ** 2) ** -2.5
     return found / found.sum()
+
+
+def cap_volumes(levels_m, area_m2, radius_m):
+    """(k, degrees) what P_l of the angle from the bottom adds to volumes below levels of a sphere.
+
+    Dips count from the wall itself: it takes the free surface along.
+    """
+    return radius_m**2 * cap_integrals(1 - levels_m / radius_m) - area_m2[:, None]
 
 
 def cap_integrals(cosine):

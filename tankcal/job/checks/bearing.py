@@ -1,7 +1,9 @@
 """Which inputs of uncertainty.csv have an effect on a job, and why the others have none."""
 
+from tankcal.job.checking import loads_sphere
 from tankcal.job.checks.extent import (
     has_clouds,
+    has_great_circles,
     has_hits,
     has_radii_alone,
     has_wall_points,
@@ -37,6 +39,7 @@ def useless_inputs(values, tables, kind):
         rules |= _of_horizontal(values, has_wall_points(tables))
     elif kind == "sphere":
         rules |= _of_wall(values["sphere"], values, has_wall_points(tables))
+        rules |= _of_sphere(values, tables)
     return others | {name: why for name, why in rules.items() if why}
 
 
@@ -197,6 +200,38 @@ def _of_wall(given, values, has_points):
         else message("no_points", "expected only with points; without points, declare diameter"),
         "plate_thickness": "" if outside and given["thickness_mm"] else nothing,
     }
+
+
+def _of_sphere(values, tables):
+    """What great circles tell, and what widens a sphere."""
+    table, survey = values["table"], values["survey"]
+    off = values["corrections"]["head"] is False
+    liquid = (survey["liquid_density_kg_m3"] or 0) * (survey["liquid_level_m"] or 0)
+    no_survey_liquid = message(
+        "no_survey_liquid", "expected only with survey.liquid_level_m above 0"
+    )
+    rules = {
+        "youngs_modulus": loads_sphere(values)
+        or message("no_load_of_sphere", "expected only with a pressure or a liquid that loads it"),
+        "liquid_density": (table["liquid_density_kg_m3"] and not off)
+        or message(
+            "no_liquid_head", "expected only with a liquid head: table.liquid_density_kg_m3"
+        ),
+        "pressure": (table["pressure_bar"] and not off)
+        or message("no_table_pressure", "expected only with table.pressure_bar above 0"),
+        "survey_pressure": (survey["pressure_bar"] and not off)
+        or message("no_survey_pressure", "expected only with survey.pressure_bar above 0"),
+        **dict.fromkeys(
+            ("survey_level", "survey_density"), (liquid and not off) or no_survey_liquid
+        ),
+    }
+    found = {name: why for name, why in rules.items() if isinstance(why, str)}
+    if has_great_circles(tables):
+        found["diameter"] = message("from_circles", "its uncertainty comes from the great circles")
+    plate = (values["survey"]["side"] == "outside") and values["corrections"]["plate"] is not False
+    if loads_sphere(values) and values["sphere"]["thickness_mm"] and not plate:
+        found["plate_thickness"] = ""  # it gives way to what loads it
+    return found
 
 
 def _from_points(has_points):

@@ -35,7 +35,7 @@ def check_strapping(values, tables, registers, raw, log):
     """Circumferences with a tape, on courses that are there; obstructions and checks that fit."""
     straps = tables["circumferences"]
     if not is_strapped(tables):
-        _tell_without_effect(tables, log)
+        tell_without_effect(tables, log)
         return
     if len(straps.rows) > MOST_STRAPS:
         log.problem(straps.file, too_many_straps(len(straps.rows)))
@@ -46,13 +46,14 @@ def check_strapping(values, tables, registers, raw, log):
     alone = _stands_alone(tables, raw)
     every = alone and not has_radii(tables) and raw.tables.get("radii", ()) is not None
     _check_courses(straps, tables, courses, known, every, log)
-    _check_tapes(straps, registers["instruments"], tapes, raw, log)
-    _check_obstructions(tables["obstructions"], set(straps.of("circumference")), log)
+    check_tapes(straps, registers["instruments"], tapes, raw, log)
+    _check_pulls(straps, log)
+    check_obstructions(tables["obstructions"], set(straps.of("circumference")), log)
     if has_rows(tables["obstructions"]):
         check_spans(tables["obstructions"], straps, tapes_read(straps, tapes), tapes, raw, log)
     if has_rows(tables["thickness"]):
         refuse_others(tables["thickness"], "course", known, log)
-    _check_comparisons(tables["tape_checks"], tapes, raw, log)
+    check_comparisons(tables["tape_checks"], tapes, raw, log)
     if values is not None:
         _check_settings(values, tables, tapes, alone, raw, log)
         check_levels(straps, courses, values, log)
@@ -81,9 +82,10 @@ def tapes_read(straps, tapes):
     return [name or usual for name in straps.of("instrument")]
 
 
-def _tell_without_effect(tables, log):
+def tell_without_effect(tables, log):
+    """A warning of what only a strapping needs."""
     for name in ("obstructions", "thickness", "tape_checks"):
-        if has_rows(tables[name]):
+        if has_rows(tables.get(name)):
             expected = message(
                 "not_strapped", "without effect: the job has no circumferences by tape"
             )
@@ -145,7 +147,11 @@ def refuse_others(table, column, known, log):
             log.problem(table.file, expected, row, column)
 
 
-def _check_tapes(straps, instruments, tapes, raw, log):
+def check_tapes(straps, instruments, tapes, raw, log):
+    """A tape for each reading, and of each what its readings need.
+
+    straps  readings with instrument; instruments, tapes  {name: {key: value}}
+    """
     file = raw.file_of("instruments")
     for row, name, tape in zip(
         straps.rows, straps.of("instrument"), tapes_read(straps, tapes), strict=True
@@ -165,12 +171,6 @@ def _check_tapes(straps, instruments, tapes, raw, log):
                 hint=nearest(tape, tapes) if found is None else "",
             )
             log.problem(straps.file, expected, row, "instrument")
-    for row, pulls in zip(straps.rows, straps.of("pulls"), strict=True):
-        if pulls is not None and pulls != int(pulls):
-            expected = message(
-                "part_of_a_pull", "found {pulls:g}; expected a whole number", pulls=pulls
-            )
-            log.problem(straps.file, expected, row, "pulls")
     if "instruments" not in raw.registers or raw.registers["instruments"] is None:
         return
     rows = raw.registers["instruments"].rows
@@ -181,6 +181,15 @@ def _check_tapes(straps, instruments, tapes, raw, log):
         refuse_free_scale(given, file, rows.get(name), name, log)
         for key, expected in _missing_of(given, tapes):
             log.problem(file, expected, rows.get(name), f"{name}.{key}")
+
+
+def _check_pulls(straps, log):
+    for row, pulls in zip(straps.rows, straps.of("pulls"), strict=True):
+        if pulls is not None and pulls != int(pulls):
+            expected = message(
+                "part_of_a_pull", "found {pulls:g}; expected a whole number", pulls=pulls
+            )
+            log.problem(straps.file, expected, row, "pulls")
 
 
 def refuse_free_scale(given, file, row, name, log):
@@ -229,7 +238,8 @@ def _missing_of(given, tapes):
         )
 
 
-def _check_obstructions(table, names, log):
+def check_obstructions(table, names, log):
+    """Obstructions on circumferences of these names, with the lengths of their kinds."""
     if not has_rows(table):
         return
     refuse_others(table, "circumference", names, log)
@@ -254,7 +264,8 @@ def _check_obstructions(table, names, log):
             log.problem(table.file, expected, row, "over_mm")
 
 
-def _check_comparisons(table, tapes, raw, log):
+def check_comparisons(table, tapes, raw, log):
+    """Comparisons of one working tape, where there is one."""
     working = [name for name, given in tapes.items() if given["master"] is not None]
     if has_rows(table) and len(working) != 1:
         expected = message(
@@ -284,14 +295,7 @@ def _check_settings(values, tables, tapes, alone, raw, log):
             " circle",
         )
         tell(log.problem, raw, "shell", "shape_sd_mm", expected)
-    expands = any(given["expansion_per_k"] for given in tapes.values())
-    read = None not in tables["circumferences"].of("temperature_c")
-    if expands and not read and is_not_given(raw, "survey", "shell_temperature_c"):
-        expected = message(
-            "tape_of_no_temperature",
-            "missing; expected it, or temperature_c of every reading: the tape expands",
-        )
-        tell(log.problem, raw, "survey", "shell_temperature_c", expected)
+    check_tape_temperature(tables["circumferences"], tapes, raw, log)
     if alone and values["survey"]["side"] == "inside":
         expected = message(
             "strapped_inside", "found inside; expected outside: a tape lies on the outside"
@@ -304,6 +308,18 @@ def _check_settings(values, tables, tapes, alone, raw, log):
             form=values["bottom"]["form"],
         )
         tell(log.problem, raw, "bottom", "form", expected)
+
+
+def check_tape_temperature(straps, tapes, raw, log):
+    """The temperature of a tape that expands, or that of the shell that it lies on."""
+    expands = any(given["expansion_per_k"] for given in tapes.values())
+    read = None not in straps.of("temperature_c")
+    if expands and not read and is_not_given(raw, "survey", "shell_temperature_c"):
+        expected = message(
+            "tape_of_no_temperature",
+            "missing; expected it, or temperature_c of every reading: the tape expands",
+        )
+        tell(log.problem, raw, "survey", "shell_temperature_c", expected)
 
 
 def check_levels(straps, courses, values, log):

@@ -25,6 +25,7 @@ from tankcal.job.model.settings import (
     TableSpec,
     Tank,
 )
+from tankcal.survey.great_circles import GreatCircles
 from tankcal.survey.measurements import Measurements
 from tankcal.survey.points import Points
 from tankcal.survey.reference_line import ReferenceLines
@@ -123,6 +124,8 @@ class Job:
         some courses.
     change : Change or None
         How they may have changed since then; beside a survey.
+    great_circles : GreatCircles or None
+        Equator and meridians of a sphere by tape, in place of points.
     """
 
     tank: Tank | None
@@ -160,3 +163,4 @@ class Job:
     liquid: Metering | None = None
     radii: Radii | None = None
     change: Change | None = None
+    great_circles: GreatCircles | None = None

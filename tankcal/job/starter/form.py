@@ -9,7 +9,9 @@ from tankcal.job.contract import (
     REGISTER_KEYS,
     REGISTERS_OF_SURVEY,
     SURVEYS,
+    SURVEYS_OF_SPHERE,
     TABLES_OF_KIND,
+    tables_of_survey,
 )
 from tankcal.job.contract.radii import KEYS as OF_RADII
 from tankcal.job.contract.uncertainty import UNITS
@@ -22,6 +24,7 @@ DECLARED = "radii"  # no survey, but what a former table, a record or somebody s
 OF_SHELLS = (*STRAPPED, "wall-hits", "tangents", DECLARED)  # surveys of upright tanks alone
 STARTS_OF_STRAPPING = {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
 STARTS_OF_LIQUID = {"survey.side": "inside", "datum.bottom_z_m": "0.0"}  # of upright tanks
+OF_GREAT_CIRCLES = (("sphere", "ovality_mm"), ("sphere", "form_mm"))
 PLACEHOLDER = "NAME"  # of a camera or an instrument
 
 
@@ -42,7 +45,9 @@ class Form:
         if self.survey is not None:
             _refuse_others(self.survey, SURVEYS)
             has_none = "points" not in TABLES_OF_KIND[self.kind] and self.survey != METERED
-            if has_none or (self.survey in OF_SHELLS and self.kind != "vertical"):
+            of_shells = self.survey in OF_SHELLS and self.survey not in SURVEYS_OF_SPHERE
+            of_shells |= self.survey in SURVEYS_OF_SPHERE and self.kind == "horizontal"
+            if has_none or (of_shells and self.kind != "vertical"):
                 raise ValueError(f"a tank of kind {self.kind} has no survey; expected another kind")
 
     @property
@@ -51,7 +56,10 @@ class Form:
         of_tank = TABLES_OF_KIND[self.kind]
         if self.survey is None:
             return of_tank
-        return (*SURVEYS[self.survey], *(table for table in of_tank if table != "points"))
+        return (
+            *tables_of_survey(self.kind, self.survey),
+            *(table for table in of_tank if table != "points"),
+        )
 
     @property
     def registers(self):
@@ -82,6 +90,8 @@ class Form:
             return "outside"
         if self.survey in (METERED, DECLARED) and self.kind == "vertical":
             return STARTS_OF_LIQUID.get(f"{section}.{field.name}", field.start)
+        if self.survey in STRAPPED and self.kind == "sphere":
+            return field.start if (section, field.name) != ("survey", "side") else "outside"
         if self.survey in STRAPPED:
             return STARTS_OF_STRAPPING.get(f"{section}.{field.name}", field.start)
         return field.start
@@ -117,6 +127,8 @@ class Form:
         if field.of_survey and self.survey is None:
             return False
         if section in ("shell", "strapping") and self.survey not in STRAPPED:
+            return False
+        if (section, field.name) in OF_GREAT_CIRCLES and self.survey not in STRAPPED:
             return False
         if section.startswith("adjustment") and self.survey in (*STRAPPED, METERED, DECLARED):
             return False
