@@ -38,6 +38,7 @@ from tankcal.pipeline.statements import (
     statements,
     verdict_of,
 )
+from tankcal.pipeline.strapped_sphere import StrappedSphere
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.survey_warnings import incomplete_certificate, open_questions
 from tankcal.pipeline.surveying import find_survey, placed
@@ -96,6 +97,8 @@ class Result:
         The wall of the drawing, of an upright tank that only liquid tells.
     radii : radii_wall.RadiiWall or None
         The wall of declared radii, with what was measured again in them.
+    circles : strapped_sphere.StrappedSphere or None
+        The sphere that a tape was put round.
     body : body.Body
         The tank as the sum of its parts, with all corrections that are on.
     zero_m : float
@@ -154,6 +157,7 @@ class Result:
     liquid: LiquidResult | None = None
     nominal: NominalWall | None = None
     radii: RadiiWall | None = None
+    circles: StrappedSphere | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -410,6 +414,7 @@ def _run(job, progress, part_progress, simulated, reading):
         liquid=liquid,
         nominal=survey if isinstance(survey, NominalWall) else None,
         radii=radii,
+        circles=survey if isinstance(survey, StrappedSphere) else None,
     )
 
 

@@ -39,7 +39,7 @@ from tankcal.tank.factors import Factor, survey_factors
 from tankcal.tank.surveyed_form import NODES, SurveyedForm, node_levels
 from tankcal.uncertainty import factor_of
 
-KINDS = ("bulge", "ovality", "seams")
+KINDS = ("bulge", "ovality", "oblateness", "seams")
 MOST_ROUNDS = 10
 NEIGHBOURS = 12
 DENT_M = 0.02  # depth of a dent that one point alone may show

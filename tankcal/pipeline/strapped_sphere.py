@@ -37,7 +37,7 @@ from tankcal.uncertainty import factor_of
 
 OVALITY_SHARE = 1e-3  # of the radius: degree 2 of a sphere where nobody measured or declared it
 NO_AREA_TERM = AreaTerm(0.0, 0.0)  # the field has it: a tape on a sphere is a mean of radii
-ROUNDING = 1e-9  # of the volume: a column that is smaller is none
+ROUNDING = 1e-7  # of the volume: a column that is smaller is none
 
 
 @dataclass(frozen=True)
@@ -93,6 +93,19 @@ class StrappedSphere:
         pull = -self.fit.precision @ self.fit.residuals_m
         told = own > 1e-6 * whole
         return np.where(told, pull / np.sqrt(np.where(told, own, 1.0)), np.nan)
+
+    def sd_of_check_m(self, place):
+        """Standard deviation of a reading that is only compared from the ellipsoid, m."""
+        azimuth = self.azimuth_rad[place : place + 1]
+        _, by = great_circle_lengths(self.fit.unknowns, azimuth)
+        here = OnGreatCircles(self.places.radius_m, _normals(azimuth))
+        form = FULL_TURN**2 * _parts(here, self.variances_m2).sum(axis=0)
+        own = self.reduced[place]
+        shared = sum(effect.by_m**2 for effect in own.effects)
+        of_fit = by @ self.fit.weights
+        prior = by @ self.fit.by_prior
+        found = form + of_fit @ self._lengths_m2 @ of_fit.T + prior @ prior.T
+        return float(np.sqrt(found[0, 0] + own.sd_m**2 + shared))
 
     @property
     def _lengths_m2(self):

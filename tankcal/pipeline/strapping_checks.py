@@ -36,7 +36,7 @@ def check_strapped(job, wall):
     straps = wall.straps
     return (
         *check_tapes(job, straps),
-        *_of_repeats(straps),
+        *check_repeats(straps.reduced),
         *_of_pairs(job, straps),
         *(_of_courses(job, straps) if job.radii is None else ()),  # else not all were strapped
         *_of_first_course(job, straps),
@@ -48,7 +48,7 @@ def check_straps_beside_points(job, straps):
     """`Problem`s of straps round a wall that points show."""
     return (
         *check_tapes(job, straps),
-        *_of_repeats(straps),
+        *check_repeats(straps.reduced),
         *_of_contradicted(straps),
     )
 
@@ -87,10 +87,10 @@ def _problem(text, strap=None, column="reading_m"):
     return Problem(FILE, text, row=None if strap is None else strap.row, column=column)
 
 
-def _of_repeats(straps):
-    """Repeats that differ by more than they may."""
+def check_repeats(reduced):
+    """`Problem`s of repeats that differ by more than they may."""
     by_name = {}
-    for one in straps.reduced:
+    for one in reduced:
         by_name.setdefault(one.strap.name, []).append(one)
     for name, several in by_name.items():
         if len(several) < 2:

@@ -123,7 +123,7 @@ SPHERE = (
     number(
         "form_mm",
         "only with great_circles: standard deviation of its radius beyond the ellipsoid (plates,"
-        " seams, legs), millimetres; blank: 5.8",
+        " seams, legs), millimetres; blank: 4.3",
         0,
         500,
         kinds=SPHERE_ONLY,

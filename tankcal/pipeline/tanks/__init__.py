@@ -1,7 +1,7 @@
 """From a checked job to the body of its tank: every part, with the corrections that are on."""
 
 from tankcal.pipeline.tanks.common import as_declared, thermal_scale
-from tankcal.pipeline.tanks.solid import sized_job, solid_body, solid_zero
+from tankcal.pipeline.tanks.solid import pressure_of, sized_job, solid_body, solid_zero
 from tankcal.pipeline.tanks.vertical import (
     critical_zone,
     insets_of,
@@ -15,6 +15,7 @@ __all__ = [
     "body_of",
     "critical_zone",
     "insets_of",
+    "pressure_of",
     "shell_volume",
     "sized_job",
     "thermal_scale",

@@ -11,7 +11,6 @@ from tankcal.tank.heads import End
 from tankcal.tank.meshes import mesh_part
 from tankcal.tank.solids import LyingTank, Sphere
 
-
 POISSON = 0.3  # of steel
 
 
