@@ -13,6 +13,7 @@ from tankcal.pipeline.corrections import Correction
 from tankcal.record import statements, survey, table, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.clouds import CloudsRecord, clouds_of
+from tankcal.record.great_circles import GreatCirclesRecord, great_circles_of
 from tankcal.record.hits import HitsRecord, hits_of
 from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.liquid import LiquidRecord, liquid_of
@@ -80,6 +81,9 @@ class Record(Saved, kw_only=True):
     radii: RadiiRecord | None = key(
         "radii out of a former table; left out where there are none", default=None, optional=True
     )
+    great_circles: GreatCirclesRecord | None = key(
+        "strapped sphere; left out where there is none", default=None, optional=True
+    )
     courses: list[survey.CourseOfShell] = key("from the bottom up", default=())
     capacity: table.CapacityTable | None = key("the table", default=None)
     interpolation: table.InterpolationError | None = key("between rows", default=None)
@@ -122,6 +126,7 @@ def record_of(result):
             tangents=tangents_of(result),
             liquid=liquid_of(result),
             radii=radii_of(result),
+            great_circles=great_circles_of(result),
             courses=survey.courses_of(result),
             capacity=table.capacity_of(result),
             interpolation=filled_from(table.InterpolationError, result.straightness),

@@ -22,6 +22,7 @@ _NOT_IN_ALL = (
     "clouds",
     "liquid",
     "radii",
+    "great_circles",
 )
 _PARTS = (
     ("certificate.pdf", "certificate"),

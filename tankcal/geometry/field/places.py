@@ -34,7 +34,7 @@ class Departure:
         Its name in a budget: "bulge", "ovality", "oblateness", "legs" or "seams".
     shape : str
         Around a cylinder "mean" (the mean radius), "first" (the axis moves), "oval" (mode k of
-        variance k^-3, from 2 on) or "local" (lost over `width_m` along the arc). On a sphere "oval"
+        variance k^-3, from 2 on) or "local" (lost over `width_m` of the arc). On a sphere "oval"
         (degree l of variance l^-3, from 2 on), "local", or "zonal" (P_2 about the vertical: what its
         own weight and its liquid make of it); of its great circles "band", about the
         equator, where legs press a sphere in.

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.job.checking import UNIT_FACTOR, has_rows, tell
-from tankcal.job.checks.extent import has_great_circles, has_wall_points
+from tankcal.job.checks.extent import has_great_circles, has_wall_points, is_metered
 from tankcal.job.checks.spans import check_spans
 from tankcal.job.checks.strapping import (
     MOST_STRAPS,
@@ -50,6 +50,11 @@ def check_great_circles(values, tables, registers, raw, log):
             " comes from either",
         )
         log.problem(table.file, expected)
+    if is_metered(tables):
+        expected = message(
+            "liquid_beside_circles", "given together with great_circles.csv; expected only one"
+        )
+        log.problem(tables["liquid"].file, expected)
     if all(use == "check" for use in table.of("use")):
         log.problem(
             table.file,

@@ -1,6 +1,16 @@
 """The working papers: courses, corrections, choices and provenance."""
 
-from tankcal.report.tables import clouds, hits, lines, liquid, radii, strapping, tangents, tank
+from tankcal.report.tables import (
+    clouds,
+    great_circles,
+    hits,
+    lines,
+    liquid,
+    radii,
+    strapping,
+    tangents,
+    tank,
+)
 from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
@@ -29,6 +39,17 @@ def strapping_sheet(book, record):
         (book.word("headings.strapped_courses"), "strapped_courses",
          columns_of(book, strapping.STRAPPED_COURSES)),
         (book.word("headings.tapes"), "tapes", columns_of(book, strapping.TAPES)),
+    ]  # fmt: skip
+    write_tables(book, sheet, _HEAD_ROW, tables)
+
+
+def great_circles_sheet(book, record):
+    """Every reading of a tape round a sphere with its corrections, and the tapes."""
+    sheet = book.sheet("great_circles", book.word("texts.circles_subtitle"), landscape=True)
+    tables = [
+        (book.word("headings.great_circles"), "great_circles",
+         columns_of(book, great_circles.CIRCLES)),
+        (book.word("headings.tapes"), "tapes", columns_of(book, great_circles.TAPES_OF_SPHERE)),
     ]  # fmt: skip
     write_tables(book, sheet, _HEAD_ROW, tables)
 
