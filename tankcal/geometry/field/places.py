@@ -35,9 +35,9 @@ class Departure:
     shape : str
         Around a cylinder "mean" (the mean radius), "first" (the axis moves), "oval" (mode k of
         variance k^-3, from 2 on) or "local" (lost over `width_m` of the arc). On a sphere "oval"
-        (degree l of variance l^-3, from 2 on), "local", or "zonal" (P_2 about the vertical: what its
-        own weight and its liquid make of it); of its great circles "band", about the
-        equator, where legs press a sphere in.
+        (degree l of variance l^-3, from 2 on), "local", or "zonal" (P_2 about the vertical: what
+        its own weight makes of it); of its great circles "band", about the equator, where legs
+        press a sphere in.
     width_m : float
         Of a local one, along the arc; of a band the latitude, rad.
     length_m : float

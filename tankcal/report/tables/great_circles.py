@@ -10,7 +10,7 @@ CIRCLES = Table(
     "circles",
     (
         Column("circle", sheet="circle", width=12, csv="circle", on=_BOTH),
-        Column("azimuth_deg", "deg", decimals=1, on="circles", heading="azimuth",
+        Column("azimuth_deg", "deg", decimals=1, on="circles", heading="line_azimuth",
                sheet="circle_azimuth_deg", csv="azimuth_deg"),
         Column("tape", on="circles", sheet="tape", width=12, csv="tape"),
         Column("reading_m", "m", decimals=4, on=_BOTH, sheet="strap_reading_m", csv="reading_m"),
