@@ -57,7 +57,7 @@ from tankcal.tank.capacity import Capacity, Quantity
 from tankcal.tank.dips import Dips, ProportionalParts, Straightness, proportional_parts
 from tankcal.tank.falling_capacity import refuse_falling
 from tankcal.tank.rules import RuleVerdict
-from tankcal.tank.service import shell_factor, shell_temperature_c
+from tankcal.tank.service import shell_factor, shell_temperature_c, solid_factor
 from tankcal.tank.volumes import ShellVolume
 from tankcal.text.digits import decimals_of_height, fixed
 from tankcal.text.display import table_html, volume_text
@@ -269,13 +269,19 @@ class Result:
         *,
         insulated: bool = False,
     ) -> float:
-        """Volume at a dip of a shell that the liquid keeps at another temperature: V times CTSh.
+        """Volume at a dip of a shell that the liquid keeps at another temperature: V times CTSh,
+        of a tank that is one solid as it grows all over (`service.solid_factor`).
 
         ambient_c  needed for a shell that is not insulated (`service.shell_temperature_c`)
         """
         shell_c = shell_temperature_c(liquid_c, ambient_c, insulated=insulated)
         reference, expansion = self.job.table.reference_temperature_c, self.job.material
-        factor = shell_factor(shell_c, reference, expansion.expansion_per_k)
+        expands = expansion.expansion_per_k
+        if self.job.tank.kind == "vertical":
+            factor = shell_factor(shell_c, reference, expands)
+        else:
+            levels = np.array([height_m + self.zero_m])
+            factor = float(solid_factor(self.body, levels, shell_c, reference, expands)[0])
         return self.at(height_m).value_m3 * factor
 
     def dip_of(self, volume_m3: float | np.ndarray) -> Dips:

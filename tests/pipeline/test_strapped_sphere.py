@@ -130,6 +130,15 @@ def test_table_says_its_pressure(example):
     assert head.size_m3 / unloaded == pytest.approx(3 * strain, rel=2e-3)
 
 
+def test_a_sphere_in_service_grows_all_over(tmp_path):
+    """Closed form: V = pi d^2 (3 R - d) / 3 at a fixed dip: 1.5 a at half height, 3 a when full."""
+    sphere = job_parts(kind="sphere", settings={"material.expansion_per_k": 1e-5})
+    found = tankcal.run(tankcal.load(write_folder(tmp_path / "job", sphere)))
+    for dip, times in ((10.0, 1.5), (20.0, 3.0)):
+        warm = found.in_service_m3(dip, 60.0, insulated=True)
+        assert warm / found.at(dip).value_m3 - 1 == pytest.approx(times * 40e-5, rel=2e-3)
+
+
 def test_dip_plate_above_the_bottom(tmp_path):
     """Property: the same tank from another zero."""
     high = result_of(tmp_path / "a", settings={"datum.dip_plate_z_m": 0.25})
