@@ -13,6 +13,7 @@ from tankcal.job.checks.strapping import (
     check_obstructions,
     check_tape_temperature,
     check_tapes,
+    refuse_inside,
     tapes_of,
     tapes_read,
     tell_without_effect,
@@ -118,11 +119,7 @@ def _check_settings(values, table, tapes, raw, log):
         )
         tell(log.problem, raw, "sphere", "diameter_m", expected)
     check_tape_temperature(table, tapes, raw, log)
-    if values["survey"]["side"] == "inside":
-        expected = message(
-            "strapped_inside", "found inside; expected outside: a tape lies on the outside"
-        )
-        tell(log.problem, raw, "survey", "side", expected)
+    refuse_inside(values, raw, log)
     _check_sizes(values, table, log)
 
 

@@ -296,11 +296,8 @@ def _check_settings(values, tables, tapes, alone, raw, log):
         )
         tell(log.problem, raw, "shell", "shape_sd_mm", expected)
     check_tape_temperature(tables["circumferences"], tapes, raw, log)
-    if alone and values["survey"]["side"] == "inside":
-        expected = message(
-            "strapped_inside", "found inside; expected outside: a tape lies on the outside"
-        )
-        tell(log.problem, raw, "survey", "side", expected)
+    if alone:
+        refuse_inside(values, raw, log)
     if alone and values["bottom"]["form"] in ("leaning", "points"):
         expected = message(
             "bottom_needs_axis",
@@ -320,6 +317,15 @@ def check_tape_temperature(straps, tapes, raw, log):
             "missing; expected it, or temperature_c of every reading: the tape expands",
         )
         tell(log.problem, raw, "survey", "shell_temperature_c", expected)
+
+
+def refuse_inside(values, raw, log):
+    """A problem where a wall that a tape alone measured is said to be measured inside."""
+    if values["survey"]["side"] == "inside":
+        expected = message(
+            "strapped_inside", "found inside; expected outside: a tape lies on the outside"
+        )
+        tell(log.problem, raw, "survey", "side", expected)
 
 
 def check_levels(straps, courses, values, log):
