@@ -32,6 +32,7 @@ def sphere_parts(circles=FOUR, *, settings=None, tape=None, s_mm=0.5, repeats=1)
         "sphere.diameter_m": None,
         "sphere.thickness_mm": 0.0,
         "table.monte_carlo": False,
+        "table.step_m": 0.25,
     }
     parts = job_parts(kind="sphere", settings=given | (settings or {}))
     rows = []
