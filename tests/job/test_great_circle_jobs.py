@@ -73,6 +73,7 @@ def test_lying_cylinders_have_no_strapping(tmp_path):
         (2, 2, 10.0, "azimuth_deg", "equator_with_azimuth"),
         (5, 0, "M60", "circle", "circle_elsewhere"),
         (4, READING, 6.28287, "reading_m", "circle_of_other_size"),
+        (4, READING, 58.0, "reading_m", "circle_of_other_size"),
         (4, READING, 62828.71, "reading_m", "outside_bounds"),
         (4, 1, "parallel", "kind", "expected_choice"),
         (4, 4, 0.0, "s_mm", "outside_bounds"),
@@ -82,6 +83,11 @@ def test_bad_rows_are_told(tmp_path, row, column, value, place, code):
     found = problems(tmp_path, spoilt(row, column, value))
     assert [one[:3] for one in found] == [(FILE, row, place)]
     assert found[0][3] == code or code in ("outside_bounds", "expected_choice")
+
+
+def test_circles_unlike_the_drawing_are_told_once(tmp_path):
+    parts = sphere_parts(settings={"tank.nominal_diameter_m": 200.0})
+    assert problems(tmp_path, parts) == [(FILE, 2, "reading_m", "circle_of_other_size")]
 
 
 def test_all_rows_checks(tmp_path):

@@ -140,6 +140,16 @@ def test_a_sphere_in_service_grows_all_over(tmp_path):
         assert warm / found.at(dip).value_m3 - 1 == pytest.approx(times * 40e-5, rel=2e-3)
 
 
+def test_tables_for_other_densities(tmp_path):
+    """Closed form: at half height 1.5 times the strain of the mean pressure of the liquid alone."""
+    settings = {"sphere.thickness_mm": 20.0, "table.other_densities_kg_m3": [600.0]}
+    found = result_of(tmp_path / "job", settings=settings)
+    row = int(np.searchsorted(found.table.height_m, 10.0))
+    wider = found.by_density[600.0][row] / found.table.volume_m3[row] - 1
+    strain = 600 * 9.80665 * 10.0**2 / 4 * 0.7 / (2 * 206e9 * 0.020)
+    assert wider == pytest.approx(1.5 * strain, rel=5e-3)
+
+
 def test_dip_plate_above_the_bottom(tmp_path):
     """Property: the same tank from another zero."""
     high = result_of(tmp_path / "a", settings={"datum.dip_plate_z_m": 0.25})

@@ -21,6 +21,8 @@ from tankcal.job.checks.strapping import (
 )
 from tankcal.messages import message
 
+MOST_APART = 0.05  # great circles of one sphere, of their size
+
 
 def check_great_circles(values, tables, registers, raw, log):
     """Great circles with a tape, each in one place; obstructions and tape checks that fit."""
@@ -125,18 +127,19 @@ def _check_settings(values, table, tapes, raw, log):
 
 def _check_sizes(values, table, log):
     """Readings of one sphere, of the size of the drawing."""
-    readings = table.numbers("reading_m")
+    readings, nominal = table.numbers("reading_m"), values["tank"]["nominal_diameter_m"]
     if not np.any(np.isfinite(readings)):
         return
-    nominal = values["tank"]["nominal_diameter_m"]
-    usual = np.nanmedian(readings) if nominal is None else np.pi * nominal
-    for row, reading in zip(table.rows, readings, strict=True):
-        if np.isfinite(reading) and not 1 / UNIT_FACTOR <= reading / usual <= UNIT_FACTOR:
-            expected = message(
-                "circle_of_other_size",
-                "found {reading:g}; expected about {usual:.4g} m, as the other circles or the"
-                " drawing have it: is it in another unit?",
-                reading=reading,
-                usual=usual,
-            )
-            log.problem(table.file, expected, row, "reading_m")
+    usual, far = float(np.nanmedian(readings)), np.zeros(len(readings), dtype=bool)
+    if nominal is not None and not 1 / UNIT_FACTOR <= usual / (np.pi * nominal) <= UNIT_FACTOR:
+        usual, far = np.pi * nominal, np.arange(len(readings)) == 0
+    far |= np.abs(readings / np.nanmedian(readings) - 1) > MOST_APART
+    for row, reading in zip(np.array(table.rows)[far], readings[far], strict=True):
+        expected = message(
+            "circle_of_other_size",
+            "found {reading:g}; expected about {usual:.4g} m, as the other circles or the drawing"
+            " have it: is it in another unit, or no great circle?",
+            reading=reading,
+            usual=usual,
+        )
+        log.problem(table.file, expected, int(row), "reading_m")

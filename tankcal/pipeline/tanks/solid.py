@@ -34,7 +34,7 @@ def solid_body(job, survey, switches):
     if job.points is not None:
         survey_says = _of_scan(survey, scale)
     pressure = pressure_of(job)
-    if switches.head and pressure.is_there:
+    if switches.head and pressure.is_there and job.sphere.thickness_m:  # else nobody said how stiff
         solid = PressedSphere(solid, _membrane(job), pressure)
         unused = tuple(name for name in unused if name != "plate_thickness")
         given = {"pressure": pressure.gas_pa, "survey_pressure": pressure.survey_gas_pa}
