@@ -12,6 +12,7 @@ from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 # Named by title and edition alone: the bodies of paid standards were not read, so no clause is.
 ISO_7507 = "ISO 7507-1:2003"
 ISO_4269 = "ISO 4269:2001"
+TIMOSHENKO = "Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells"
 INSIDE_PLATE = message("inside_plate", "r_inside = r − t")
 INSIDE_PAINT = message("inside_paint", "r_inside = r − t − paint")
 NONE = Switches(**{field.name: field.name == "tilt" for field in fields(Switches)})
@@ -175,7 +176,7 @@ def _of_pressure(job):
         survey_kg_m3=load.survey_density_kg_m3,
         level_m=load.survey_level_m,
     )
-    return ("head", load.is_there, formula, "membrane theory of the sphere")
+    return ("head", load.is_there, formula, TIMOSHENKO)
 
 
 SURVEYED_BOTTOM = message(
