@@ -161,6 +161,14 @@ def test_a_survey_without_a_wall_exits_with_3(tmp_path, capsys):
     assert "nominal" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("kind", ["horizontal", "mesh"])
+def test_new_refuses_a_survey_of_another_kind(tmp_path, kind, capsys):
+    folder = tmp_path / "mine"
+    assert main(["new", str(folder), "--kind", kind, "--survey", "strapping"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not folder.exists()
+
+
 def test_new_writes_a_job_and_refuses_a_full_folder(tmp_path, capsys):
     assert main(["new", str(tmp_path / "mine")]) == 0
     assert {"job.toml", "points.csv", "courses.csv", "job.xlsx"} <= {
