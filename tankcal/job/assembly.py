@@ -223,7 +223,14 @@ def _tank(values):
 def _survey(values):
     if values["date"] is None:
         return None
-    return Survey(**{**values, "side": values["side"] or "inside"})
+    given = {name: value for name, value in values.items() if name != "pressure_bar"}
+    pressure = _pascals(values["pressure_bar"])
+    return Survey(**{**given, "side": values["side"] or "inside"}, pressure_pa=pressure)
+
+
+def _pascals(bar):
+    """None of nothing, and of 0."""
+    return 1e5 * bar if bar else None
 
 
 def _datum(values, kind, has_points):
@@ -238,10 +245,12 @@ def _table(values):
         return None
     given = _given(values)
     litres = given.pop("max_interpolation_error_l", None)
+    pressure = _pascals(given.pop("pressure_bar", None))
     return TableSpec(
         step_m=given.pop("step_m", None),
         fine_zones=tuple(sorted(given.pop("fine_zones", ()))),
         max_interpolation_error_m3=None if litres is None else litres / 1000,
+        pressure_pa=pressure,
         **given,
     )
 
@@ -251,6 +260,8 @@ def _material(values):
     si = {"e_pa": 1e9 * given["e_gpa"]} if "e_gpa" in given else {}
     if "expansion_per_k" in given:
         si["expansion_per_k"] = given["expansion_per_k"]
+    if "poisson" in given:
+        si["poisson"] = given["poisson"]
     return Material(**si, expansion_given="expansion_per_k" in given)
 
 
@@ -374,7 +385,12 @@ def _end(values, end):
 
 
 def _sphere(values):
-    return Sphere(values["diameter_m"], (values["thickness_mm"] or 0.0) / 1000)
+    lengths = (values[name] for name in ("ovality_mm", "form_mm"))
+    return Sphere(
+        values["diameter_m"],
+        (values["thickness_mm"] or 0.0) / 1000,
+        *(None if one is None else one / 1000 for one in lengths),
+    )
 
 
 def _ship(values):

@@ -13,6 +13,7 @@ from tankcal.pipeline.corrections import Correction
 from tankcal.record import statements, survey, table, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.clouds import CloudsRecord, clouds_of
+from tankcal.record.great_circles import GreatCirclesRecord, great_circles_of
 from tankcal.record.hits import HitsRecord, hits_of
 from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.liquid import LiquidRecord, liquid_of
@@ -84,6 +85,9 @@ class Record(Saved, kw_only=True):
     ship: ShipRecord | None = key(
         "corrections for trim and list; left out where there are none", default=None, optional=True
     )
+    great_circles: GreatCirclesRecord | None = key(
+        "strapped sphere; left out where there is none", default=None, optional=True
+    )
     courses: list[survey.CourseOfShell] = key("from the bottom up", default=())
     capacity: table.CapacityTable | None = key("the table", default=None)
     interpolation: table.InterpolationError | None = key("between rows", default=None)
@@ -127,6 +131,7 @@ def record_of(result):
             liquid=liquid_of(result),
             radii=radii_of(result),
             ship=ship_of(result),
+            great_circles=great_circles_of(result),
             courses=survey.courses_of(result),
             capacity=table.capacity_of(result),
             interpolation=filled_from(table.InterpolationError, result.straightness),

@@ -158,6 +158,7 @@ def choices_of(result):
         **({"form": "learned"} if result.scan is not None and job.horizontal is not None else {}),
         "thickness": _thickness_choice(job, result),
         "temperature": _temperature_choice(job),
+        **_sphere_choices(job),
         "height_expansion": "yes" if job.table.height_expansion else "no",
         "head": _head_choice(job),
         "deadwood": _fitting_choice(job.switches.deadwood, job.deadwood),
@@ -264,6 +265,16 @@ def _ring_choices(result):
         "between_sections": "rings",
         "form": "learned",
     }
+
+
+def _sphere_choices(job):
+    """How a sphere was taken that great circles describe, and the pressure that it is for."""
+    found = {}
+    if job.great_circles is not None:
+        found["survey"] = "great_circles"
+    if job.sphere is not None and job.switches.head and job.table.pressure_pa:
+        found["pressure"] = job.table.pressure_pa / 1e5
+    return found
 
 
 def _liquid_choices(result):
@@ -420,6 +431,7 @@ def solid_of(result):
         return described(
             diameter=(result.body.parts[0].solid.diameter_m, "m"),
             **_of_scan(result),
+            **_of_ellipsoid(result),
             full_capacity=(result.body.parts[0].capacity_m3, "m3"),
         )
     if job.mesh is not None:
@@ -429,6 +441,20 @@ def solid_of(result):
             full_capacity=(result.body.parts[0].capacity_m3, "m3"),
         )
     return None
+
+
+def _of_ellipsoid(result):
+    """Semi-axes inside of a strapped sphere, as surveyed; nothing of another."""
+    if result.circles is None:
+        return {}
+    job = result.job
+    plate = job.sphere.thickness_m if job.switches.plate else 0.0
+    inside = result.circles.solid(plate)
+    return {
+        "semi_axis_a": (inside.a_m, "m"),
+        "semi_axis_b": (inside.b_m, "m"),
+        "semi_axis_c": (inside.c_m, "m"),
+    }
 
 
 def _of_lying(result):

@@ -23,6 +23,7 @@ _NOT_IN_ALL = (
     "liquid",
     "radii",
     "ship",
+    "great_circles",
 )
 _PARTS = (
     ("certificate.pdf", "certificate"),

@@ -144,8 +144,9 @@ class SolidPart(Part):
     unused : tuple of str
         Names of the solid's inputs that have no meaning in this job.
     read_with : dict
-        {input: (f,) derivative of the surveyed inputs by it}, of inputs that the readings of the
-        survey depend on: the temperature of a tape that has that of the shell.
+        {input: (f,) derivative by it of what the survey gave: the surveyed inputs, or the volumes
+        at the form's nodes}, of inputs that the readings of the survey depend on: the temperature
+        of a tape that has that of the shell.
     """
 
     solid: Part
@@ -195,7 +196,7 @@ class SolidPart(Part):
         if "diameter" in self.surveyed:
             found["offset"] = 2 * found["diameter"]
         if self.read_with:
-            by_survey = self._by_survey(found)
+            by_survey = self._by_survey(levels_m, found)
             for name, column in self.read_with.items():
                 found[name] = found.get(name, 0.0) + by_survey @ column
         without = {*self.unused, *self.surveyed}
@@ -206,14 +207,17 @@ class SolidPart(Part):
         own = tuple(self.solid.sources(self._of_solid(levels_m)))
         if not self.surveyed:
             return own
-        if self.form is None:
-            by_survey = self._by_survey(self.solid.derivatives(levels_m))
-            return (*(one.source(by_survey @ one.columns) for one in self.factors), *own)
-        weights = self.form.at(self._shares(levels_m))
-        return (*(one.source(weights @ one.columns) for one in self.form.factors), *own)
+        of_solid = self.solid.derivatives(levels_m) if self.form is None else {}
+        by_survey = self._by_survey(levels_m, of_solid)
+        factors = self.factors if self.form is None else self.form.factors
+        return (*(one.source(by_survey @ one.columns) for one in factors), *own)
 
-    def _by_survey(self, found):
-        """(rows, f) derivatives by the inputs that the survey gave, of those by all."""
+    def _by_survey(self, levels_m, found):
+        """(rows, f) derivatives by what the survey gave: the nodes of its form, or the surveyed of
+        those by all inputs.
+        """
+        if self.form is not None:
+            return self.form.at(self._shares(levels_m))
         return np.column_stack([found[name] for name in self.surveyed])
 
     @property

@@ -1,8 +1,9 @@
 """Which inputs of uncertainty.csv have an effect on a job, and why the others have none."""
 
-from tankcal.job.checking import has_rows
+from tankcal.job.checking import has_rows, loads_sphere
 from tankcal.job.checks.extent import (
     has_clouds,
+    has_great_circles,
     has_hits,
     has_radii_alone,
     has_wall_points,
@@ -20,6 +21,9 @@ NOT_SUBTRACTED = message(
     "nothing_subtracted",
     "expected only with side = outside: with side = inside nothing is subtracted",
 )
+
+NO_HEAD = message("no_liquid_head", "expected only with a liquid head: table.liquid_density_kg_m3")
+NO_SURVEY_LIQUID = message("no_survey_liquid", "expected only with survey.liquid_level_m above 0")
 
 
 def useless_inputs(values, tables, kind):
@@ -40,6 +44,7 @@ def useless_inputs(values, tables, kind):
         rules |= _of_horizontal(values, tables)
     elif kind == "sphere":
         rules |= _of_wall(values["sphere"], values, has_wall_points(tables))
+        rules |= _of_sphere(values, tables)
     elif kind == "mesh":
         rules |= _of_ship(values)
     return others | {name: why for name, why in rules.items() if why}
@@ -81,12 +86,6 @@ def _of_vertical(values, tables):
     survey, switches = values["survey"], values["corrections"]
     head = values["table"]["liquid_density_kg_m3"] and switches["head"] is not False
     no_liquid = not survey["liquid_level_m"] or switches["head"] is False
-    no_head = message(
-        "no_liquid_head", "expected only with a liquid head: table.liquid_density_kg_m3"
-    )
-    no_survey_liquid = message(
-        "no_survey_liquid", "expected only with survey.liquid_level_m above 0"
-    )
     no_roof = values["roof"]["mass_kg"] is None or switches["roof"] is False
     of_points = message(
         "offset_of_points",
@@ -96,10 +95,10 @@ def _of_vertical(values, tables):
     return _of_plates(values, tables, head or not no_liquid) | {
         "offset": of_points if _has_own_offset(tables) else "",
         "course_heights": _of_heights(tables["courses"]),
-        "youngs_modulus": no_head if not head and no_liquid else "",
-        "liquid_density": "" if head else no_head,
-        "survey_level": no_survey_liquid if no_liquid else "",
-        "survey_density": no_survey_liquid if no_liquid else "",
+        "youngs_modulus": NO_HEAD if not head and no_liquid else "",
+        "liquid_density": "" if head else NO_HEAD,
+        "survey_level": NO_SURVEY_LIQUID if no_liquid else "",
+        "survey_density": NO_SURVEY_LIQUID if no_liquid else "",
         "bottom": _of_bottom(values, tables["bottom"]),
         "roof_mass": message("no_floating_roof", "expected only with a floating roof: [roof]")
         if no_roof
@@ -243,6 +242,32 @@ def _of_wall(given, values, has_points):
         else message("no_points", "expected only with points; without points, declare diameter"),
         "plate_thickness": "" if outside and given["thickness_mm"] else nothing,
     }
+
+
+def _of_sphere(values, tables):
+    """What great circles tell, and what widens a sphere."""
+    table, survey = values["table"], values["survey"]
+    off = values["corrections"]["head"] is False
+    liquid = (survey["liquid_density_kg_m3"] or 0) * (survey["liquid_level_m"] or 0)
+    rules = {
+        "youngs_modulus": loads_sphere(values)
+        or message("no_load_of_sphere", "expected only with a pressure or a liquid that loads it"),
+        "liquid_density": (table["liquid_density_kg_m3"] and not off) or NO_HEAD,
+        "pressure": (table["pressure_bar"] and not off)
+        or message("no_table_pressure", "expected only with table.pressure_bar above 0"),
+        "survey_pressure": (survey["pressure_bar"] and not off)
+        or message("no_survey_pressure", "expected only with survey.pressure_bar above 0"),
+        **dict.fromkeys(
+            ("survey_level", "survey_density"), (liquid and not off) or NO_SURVEY_LIQUID
+        ),
+    }
+    found = {name: why for name, why in rules.items() if isinstance(why, str)}
+    if has_great_circles(tables):
+        found["diameter"] = message("from_circles", "its uncertainty comes from the great circles")
+    plate = (values["survey"]["side"] == "outside") and values["corrections"]["plate"] is not False
+    if loads_sphere(values) and values["sphere"]["thickness_mm"] and not plate:
+        found["plate_thickness"] = ""  # it gives way to what loads it
+    return found
 
 
 def _from_points(has_points):

@@ -45,6 +45,11 @@ def is_metered(tables):
     return has_rows(tables.get("liquid"))
 
 
+def has_great_circles(tables):
+    """Was a tape put round a sphere?"""
+    return has_rows(tables.get("great_circles"))
+
+
 def has_radii(tables):
     """Are there radii of a former table, a record or a declaration?"""
     return has_rows(tables.get("radii"))
@@ -121,6 +126,9 @@ def extent_of(values, tables, kind):
         return _of_horizontal(values["horizontal"], values, wall_of(tables) is not None)
     if kind == "sphere":
         diameter = values["sphere"]["diameter_m"] or values["tank"]["nominal_diameter_m"]
+        if diameter is None and has_great_circles(tables):
+            readings = tables["great_circles"].numbers("reading_m")
+            diameter = np.nanmedian(readings) / np.pi if np.any(readings > 0) else None
         area = None if diameter is None else np.pi / 4 * diameter**2
         return _lying(diameter, 0.0, area, values, has_wall_points(tables))
     return Extent()

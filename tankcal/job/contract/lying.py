@@ -1,6 +1,6 @@
 """[horizontal] and [sphere]: their keys; sizes complete, consistent, and said once."""
 
-from tankcal.job.checking import is_not_given, missing_beside, tell
+from tankcal.job.checking import is_not_given, missing_beside, settings_place, tell
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.messages import message
 
@@ -107,8 +107,27 @@ HORIZONTAL = (
     ),
 )
 SPHERE = (
-    _length("diameter_m", "diameter, metres: FILL IN this, or the points", SPHERE_ONLY),
+    _length(
+        "diameter_m", "diameter, metres: FILL IN this, or the points, or great circles", SPHERE_ONLY
+    ),
     _thickness(SPHERE_ONLY),
+    number(
+        "ovality_mm",
+        "only with great_circles: standard deviation of how oval and how flat the sphere is, where"
+        " no strap tells it, millimetres; blank: 0.1 % of its radius",
+        0,
+        500,
+        above_low=True,
+        kinds=SPHERE_ONLY,
+    ),
+    number(
+        "form_mm",
+        "only with great_circles: standard deviation of its radius beyond the ellipsoid (plates,"
+        " seams, legs), millimetres; blank: 4.3",
+        0,
+        500,
+        kinds=SPHERE_ONLY,
+    ),
 )
 
 KEYS = {"horizontal": HORIZONTAL, "sphere": SPHERE}
@@ -374,17 +393,31 @@ def _check_dip(given, height_m, raw, log):
         tell(log.warning, raw, "horizontal", "tilt_mm_per_m", expected)
 
 
-def check_sphere(values, has_points, raw, log):
-    """The diameter, or points of the wall."""
+def check_sphere(values, has_points, has_circles, is_loaded, raw, log):
+    """The diameter, points of the wall, or great circles; plates where something loads them."""
     given = values["sphere"]
-    _check_thickness(given, values["survey"]["side"], "sphere", raw, log)
+    if not is_loaded or values["survey"]["side"] == "outside":
+        _check_thickness(given, values["survey"]["side"], "sphere", raw, log)
+    if (
+        is_loaded
+        and not given["thickness_mm"]
+        and not log.has(*settings_place(raw, "sphere", "thickness_mm"))
+    ):
+        expected = message(
+            "thickness_of_loaded_sphere",
+            "missing or 0, but a pressure or a density is given; expected the plates, which give"
+            " way to it",
+        )
+        tell(log.problem, raw, "sphere", "thickness_mm", expected)
     if has_points:
         _refuse_given(given, ("diameter_m",), raw, log, "sphere")
-    elif is_not_given(raw, "sphere", "diameter_m"):
+    elif is_not_given(raw, "sphere", "diameter_m") and not has_circles:
         tell(
             log.problem,
             raw,
             "sphere",
             "diameter_m",
-            message("sphere_size_missing", "missing; expected it, or points.csv"),
+            message(
+                "sphere_size_missing", "missing; expected it, or points.csv, or great_circles.csv"
+            ),
         )

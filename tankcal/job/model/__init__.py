@@ -27,6 +27,7 @@ from tankcal.job.model.settings import (
     TableSpec,
     Tank,
 )
+from tankcal.survey.great_circles import GreatCircles
 from tankcal.survey.measurements import Measurements
 from tankcal.survey.points import Points
 from tankcal.survey.reference_line import ReferenceLines
@@ -131,6 +132,8 @@ class Job:
         some courses.
     change : Change or None
         How they may have changed since then; beside a survey.
+    great_circles : GreatCircles or None
+        Equator and meridians of a sphere by tape, in place of points.
     """
 
     tank: Tank | None
@@ -170,3 +173,4 @@ class Job:
     radii: Radii | None = None
     change: Change | None = None
     rings: tuple[Ring, ...] = ()
+    great_circles: GreatCircles | None = None

@@ -209,10 +209,16 @@ class Sphere:
         As measured, on the side of the survey; None: it comes from the points.
     thickness_m : float
         Plate and paint, to be subtracted from what was measured outside.
+    ovality_m : float or None
+        Standard deviation of its degree 2 where no strap tells it; None: a share of its radius.
+    form_m : float or None
+        Of its radius beyond that; None: as `geometry.field.places` assumes.
     """
 
     diameter_m: float | None
     thickness_m: float = 0.0
+    ovality_m: float | None = None
+    form_m: float | None = None
 
 
 @dataclass(frozen=True)

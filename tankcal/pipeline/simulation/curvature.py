@@ -32,6 +32,8 @@ VARIED = (
     "end_depth",
     "tilt",
     "dip_position",
+    "pressure",
+    "survey_pressure",
 )
 
 
@@ -61,6 +63,8 @@ _OF_VALUES = {
     "liquid_density": ("table", "liquid_density_kg_m3"),
     "survey_level": ("survey", "liquid_level_m"),
     "survey_density": ("survey", "liquid_density_kg_m3"),
+    "pressure": ("table", "pressure_pa"),
+    "survey_pressure": ("survey", "pressure_pa"),
 }
 
 

@@ -14,9 +14,12 @@ from tankcal.pipeline.tanks.common import (
 )
 from tankcal.pipeline.tanks.rings import ringed_part
 from tankcal.tank.body import Body, SolidPart
+from tankcal.tank.ellipsoids import Membrane, PressedSphere, Pressure
 from tankcal.tank.meshes import mesh_part
 from tankcal.tank.ships import Pipe, in_ship_frame, piped_mesh
 from tankcal.tank.solids import LyingTank, Sphere
+
+POISSON = 0.3  # of steel
 
 
 def solid_body(job, survey, switches, heel=(0.0, 0.0)):
@@ -43,19 +46,31 @@ def _part(job, survey, switches, heel):
     plate = 0.0
     if given and job.survey.side == "outside" and switches.plate:
         plate = given.thickness_m
-    if job.sphere is not None:
+    unused, survey_says = () if plate else ("plate_thickness",), {}
+    if job.great_circles is not None:
+        solid = survey.solid(plate, scale)
+        survey_says, unused = _of_circles(survey, plate, scale), (*unused, "offset")
+    elif job.sphere is not None:
         solid = Sphere((job.sphere.diameter_m - 2 * plate) * scale)
     elif job.horizontal is not None:
         solid = _lying(job.horizontal, plate, scale)
     else:
         solid = _of_mesh(job, survey, scale, heel)
+    if job.points is not None:
+        survey_says = _of_scan(survey, scale)
+    pressure = pressure_of(job)
+    if switches.head and pressure.is_there and job.sphere.thickness_m:  # else nobody said how stiff
+        solid = PressedSphere(solid, _membrane(job), pressure)
+        unused = tuple(name for name in unused if name != "plate_thickness")
+        given = {"pressure": pressure.gas_pa, "survey_pressure": pressure.survey_gas_pa}
+        unused += tuple(name for name, pascals in given.items() if not pascals)
     return SolidPart(
         solid,
         scale,
         job.material.expansion_per_k,
         warmed=is_warmed(job, switches),
-        **(_of_scan(survey, scale) if job.points is not None else {}),
-        unused=() if plate else ("plate_thickness",),
+        **survey_says,
+        unused=unused,
     )
 
 
@@ -113,6 +128,37 @@ def _of_scan(scan, scale):
     """What the survey gives, as arguments of `SolidPart`; volumes are to scale."""
     factors = tuple(replace(one, columns=scale**3 * one.columns) for one in scan.form.factors)
     return {"surveyed": scan.names, "form": replace(scan.form, factors=factors)}
+
+
+def _of_circles(sphere, plate_m, scale):
+    """What great circles give, as arguments of `SolidPart`; volumes are to scale."""
+    form, read_with = sphere.part_of_volumes(plate_m)
+    factors = tuple(replace(one, columns=scale**3 * one.columns) for one in form.factors)
+    return {
+        "surveyed": ("diameter",),
+        "form": replace(form, factors=factors),
+        "read_with": {name: scale**3 * column for name, column in read_with.items()},
+    }
+
+
+def pressure_of(job):
+    """`Pressure` of a sphere: of its table and of its survey; of another tank none."""
+    if job.sphere is None:
+        return Pressure()
+    table, survey = job.table, job.survey
+    return Pressure(
+        gas_pa=table.pressure_pa or 0.0,
+        density_kg_m3=table.liquid_density_kg_m3,
+        survey_gas_pa=survey.pressure_pa or 0.0,
+        survey_density_kg_m3=survey.liquid_density_kg_m3 or 0.0,
+        survey_level_m=(survey.liquid_level_m or 0.0) + solid_zero(job),
+    )
+
+
+def _membrane(job):
+    given = job.material.poisson
+    ratio = POISSON if given is None else given
+    return Membrane(job.sphere.thickness_m, job.material.e_pa, ratio)
 
 
 def _of_mesh(job, mesh, scale, heel):
