@@ -5,17 +5,20 @@ room count from the inside bottom, in metres; dips outside the tank raise Height
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from tankcal.errors import HeightError, SolutionError
 from tankcal.messages import message
-from tankcal.tank.heads import Cut, EllipseArc, End, Line, depth_of, integrate, meridian
+from tankcal.tank.arcs import Cut, EllipseArc, Line, integrate
+from tankcal.tank.gauge_tubes import GaugeTube
+from tankcal.tank.heads import RADII, End, depth_of, meridian
 from tankcal.tank.parts import Part
 
 ROUNDING = 1e-9  # of the highest dip: a dip so little outside is the top or the bottom itself
 FLAT = End("flat")
+TUBE = ("tube_angle", "tube_offset")  # inputs of a gauge tube
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,8 @@ class LyingTank(Part):
         c_p = -B + d (square),   c_p = -B + d sqrt(1 + tilt^2) (plumb),   c(s) = c_p - tilt (s - p).
 
     The highest dip is where its line meets the top of the cylinder: 2 B, plumb 2 B sqrt(1+tilt^2).
+    With a gauge tube off the axis or off the plumb, of a round tank only, c_p = depth(d) - B, its
+    d times sqrt(1 + tilt^2) where it is read plumb (`GaugeTube`).
     Sections of an end are similar to that of the cylinder. An elliptical tank is computed as the
     round one of equal section area, with heights times sqrt(width height) / (2 B), which is exact;
     the radii and the spherical form of an end are those of that round tank.
@@ -49,6 +54,11 @@ class LyingTank(Part):
         Place of the dip's zero, along the axis from the start of the cylinder at A.
     dip_direction : str
         "plumb": the dip is read along the vertical; "square": square to the axis.
+    tube_angle_rad : float
+        Of the gauge tube off the plumb, in the plane of the section; its top leans to the right as
+        seen from A. 0: plumb.
+    tube_offset_m : float
+        Distance at which the tube passes the axis, to the right of it as seen from A, when plumb.
 
     Raises
     ------
@@ -69,6 +79,8 @@ class LyingTank(Part):
     roll_rad: float = 0.0
     dip_from_a_m: float = 0.0
     dip_direction: str = "plumb"
+    tube_angle_rad: float = 0.0
+    tube_offset_m: float = 0.0
 
     def __post_init__(self):
         _above_zero("width", self.width_m)
@@ -78,6 +90,8 @@ class LyingTank(Part):
             raise SolutionError(f"dip direction {self.dip_direction!r}: expected plumb or square")
         if not np.isfinite(self.tilt) or not np.isfinite(self.roll_rad):
             raise SolutionError(f"tilt {self.tilt} and roll {self.roll_rad}: expected numbers")
+        self._check_round()
+        self._tube.slope  # built, and refused, with the tank
         depths = [(depth_of(end, self._radius_m), end) for end in (self.end_a, self.end_b)]
         inward = sum(depth for depth, end in depths if end.inward)
         if inward > self.length_m:
@@ -90,6 +104,20 @@ class LyingTank(Part):
                 )
             )
         self._check_dip()
+
+    def _check_round(self):
+        """What only a round section has: a tube off its axis, and a rolled guppy end."""
+        ends = {self.end_a.kind, self.end_b.kind}
+        if not self._is_round and (self._has_tube or (self.roll_rad and "guppy" in ends)):
+            raise SolutionError(
+                message(
+                    "round_section_only",
+                    "a section {width_m:g} m wide and {height_m:g} m high: expected a round one, "
+                    "for a gauge tube off the axis or the plumb, or rolled guppy ends",
+                    width_m=self.width_m,
+                    height_m=self.height_m,
+                )
+            )
 
     def _check_dip(self):
         low, high = self.dip_from_a_m, self.dip_from_a_m
@@ -111,7 +139,19 @@ class LyingTank(Part):
     @property
     def top_m(self):
         """The highest dip."""
+        if self._has_tube:
+            return self._tube.full_m / self._stretch
         return 2 * self._half_height_m * self._stretch
+
+    def depth_m(self, levels_m):
+        """(rows,) depths square to the axis above the lowest point of the section of each dip."""
+        along = self._stretch * np.asarray(levels_m, dtype=float)
+        return self._tube.depth_m(along) if self._has_tube else along
+
+    def height_share(self, levels_m):
+        """(rows,) depth of each dip as a share of the height of the section, and its slope."""
+        high = 2 * self._half_height_m
+        return self.depth_m(levels_m) / high, self._stretch * self._tube.slope / high
 
     @cached_property
     def capacity_m3(self):
@@ -126,7 +166,7 @@ class LyingTank(Part):
 
     def area_m2(self, levels_m):
         """(rows,) derivative of the volume by the dip; the free surface, when the dip is plumb."""
-        return self._squeeze * self._stretch * self._sum(levels_m, Cut.chord)
+        return self._squeeze * self._stretch * self._tube.slope * self._sum(levels_m, Cut.chord)
 
     def derivatives(self, levels_m):
         """{input: (rows,)} derivative of the volume at a fixed dip by each input, all else fixed.
@@ -134,7 +174,9 @@ class LyingTank(Part):
         diameter         width and height both; ends keep their depths (torispherical: their radii)
         length           of the cylinder; B moves away, A and the place of the dip stay
         end_depth        of both ends, each the way it bulges; flat ends have none, torispherical
-                         ones are stretched along the axis
+                         ones of given radii are stretched along the axis
+        dish_radius, knuckle_radius  of both ends, where torispherical ones were given by them
+        tube_angle, tube_offset      of the gauge tube, of a round tank only
         tilt             the tangent; the dip's zero stays where it is
         dip_position     dip_from_a_m
         plate_thickness  of plates that were taken off outside measures: the diameter is less by
@@ -144,9 +186,12 @@ class LyingTank(Part):
         scale            of all lengths of the tank and the place of the dip, but not of the dips
         """
         integrands = [Cut.segment, Cut.chord, Cut.chord_moment]
-        integrands += [Cut.by_radius, Cut.by_end_depth, Cut.by_end_plate]
+        inputs = ("radius", "end_depth", "end_plate", *RADII)
+        integrands += [partial(Cut.by, name=name) for name in inputs]
         found = [(piece, self._integrals(piece, levels_m, integrands)) for piece in self._pieces]
-        volume, surface, _, by_radius, by_depth, _ = sum(one for _, one in found)
+        volume, surface, _, by_radius, by_depth, _, by_dish, by_knuckle = sum(
+            one for _, one in found
+        )
         moment = sum(  # of the free surface about the place of the dip
             (piece.origin_m - self.dip_from_a_m) * one[1] + piece.way * one[2]
             for piece, one in found
@@ -154,16 +199,21 @@ class LyingTank(Part):
         surface_of_b = sum(one[1] for piece, one in found if piece.end == "b")
         by_plate = sum(piece.sign * one[5] for piece, one in found)
         levels = np.asarray(levels_m, dtype=float)
-        squeeze, tilt, stretch = self._squeeze, self.tilt, self._stretch
-        by_stretch = tilt / stretch if self.dip_direction == "plumb" else 0.0
-        datum = squeeze * stretch * surface
+        squeeze, tilt, stretch, slope = self._squeeze, self.tilt, self._stretch, self._tube.slope
+        by_stretch = tilt / stretch * slope if self.dip_direction == "plumb" else 0.0
+        datum = squeeze * stretch * slope * surface
         by_squeeze = stretch * levels * surface - tilt * moment
+        by_tube = self._tube.derivatives(stretch * levels)
         radius_by, squeeze_by = self._by_diameter
-        diameter = radius_by * (by_radius - surface) + squeeze_by * by_squeeze
-        return {
+        by_radius = by_radius - (1 - by_tube["radius"]) * surface
+        diameter = radius_by * by_radius + squeeze_by * by_squeeze
+        of_tube = {name: by_tube[name] * surface for name in TUBE if self._is_round}
+        return of_tube | {
             "diameter": diameter,
             "length": self._section_m2(levels, self.length_m) - squeeze * tilt * surface_of_b,
             "end_depth": by_depth,
+            "dish_radius": by_dish,
+            "knuckle_radius": by_knuckle,
             "tilt": squeeze * (by_stretch * levels * surface - moment),
             "dip_position": squeeze * tilt * surface,
             "plate_thickness": by_plate - 2 * diameter,
@@ -179,7 +229,7 @@ class LyingTank(Part):
         ends = (("a", self.end_a, 0.0, -1), ("b", self.end_b, self.length_m, 1))
         for name, end, origin, out in ends:
             sign = -1 if end.inward else 1
-            for arc in meridian(end, self._radius_m):
+            for arc in meridian(end, self._radius_m, np.cos(self.roll_rad)):
                 pieces.append(_Piece(arc, origin, sign * out, sign, name))
         return tuple(pieces)
 
@@ -208,8 +258,21 @@ class LyingTank(Part):
     def _liquid_m(self, levels_m, s):
         """(rows,) height of the liquid above the axis at s, in the round tank of equal area."""
         levels = _inside(levels_m, self.top_m)
-        above_dip_zero = self._stretch * levels - self.tilt * (s - self.dip_from_a_m)
+        above_dip_zero = self.depth_m(levels) - self.tilt * (s - self.dip_from_a_m)
         return self._squeeze * above_dip_zero - self._radius_m
+
+    @property
+    def _has_tube(self):
+        """Whether the dip is not that of the lowest point of the section."""
+        return bool(self.tube_angle_rad or self.tube_offset_m)
+
+    @property
+    def _is_round(self):
+        return self.width_m == self.height_m
+
+    @cached_property
+    def _tube(self):
+        return GaugeTube(self._radius_m, self.tube_angle_rad, self.tube_offset_m)
 
     @cached_property
     def _radius_m(self):
@@ -288,6 +351,10 @@ class Sphere(Part):
     def capacity_m3(self):
         """Volume of the full tank, pi D^3 / 6."""
         return np.pi * self.diameter_m**3 / 6
+
+    def height_share(self, levels_m):
+        """(rows,) levels as a share of the height, and its slope."""
+        return np.asarray(levels_m, dtype=float) / self.diameter_m, 1 / self.diameter_m
 
     def volume_m3(self, levels_m):
         """(rows,) volume below each dip."""
