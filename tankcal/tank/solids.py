@@ -91,7 +91,6 @@ class LyingTank(Part):
         if not np.isfinite(self.tilt) or not np.isfinite(self.roll_rad):
             raise SolutionError(f"tilt {self.tilt} and roll {self.roll_rad}: expected numbers")
         self._check_round()
-        self._tube.slope  # built, and refused, with the tank
         depths = [(depth_of(end, self._radius_m), end) for end in (self.end_a, self.end_b)]
         inward = sum(depth for depth, end in depths if end.inward)
         if inward > self.length_m:
@@ -108,7 +107,9 @@ class LyingTank(Part):
     def _check_round(self):
         """What only a round section has: a tube off its axis, and a rolled guppy end."""
         ends = {self.end_a.kind, self.end_b.kind}
-        if not self._is_round and (self._has_tube or (self.roll_rad and "guppy" in ends)):
+        if self._is_round:
+            GaugeTube(self._radius_m, self.tube_angle_rad, self.tube_offset_m)
+        elif self._has_tube or (self.roll_rad and "guppy" in ends):
             raise SolutionError(
                 message(
                     "round_section_only",

@@ -10,9 +10,11 @@ from tankcal.job.checks.extent import (
     may_be_hit_from_both_sides,
 )
 from tankcal.job.contract import INPUTS
-from tankcal.job.contract.bottom import bottom_form
+from tankcal.job.contract.bottom import SHAPED, bottom_form
 from tankcal.messages import message
 
+GIVEN = ("dish", "knuckle")
+SIZES_OF_END = ("depth_m", "dish_radius_m", "knuckle_radius_m", "standard")
 NOT_SUBTRACTED = message(
     "nothing_subtracted",
     "expected only with side = outside: with side = inside nothing is subtracted",
@@ -90,12 +92,13 @@ def _of_vertical(values, tables):
     )
     return _of_plates(values, tables, head or not no_liquid) | {
         "offset": of_points if _has_own_offset(tables) else "",
-        "course_heights": _of_heights(tables["courses"]),
+        "course_heights": _of_heights(tables["courses"], values),
         "youngs_modulus": no_head if not head and no_liquid else "",
         "liquid_density": "" if head else no_head,
         "survey_level": no_survey_liquid if no_liquid else "",
         "survey_density": no_survey_liquid if no_liquid else "",
         "bottom": _of_bottom(values, tables["bottom"]),
+        **_of_heads(values, tables["bottom"]),
         "roof_mass": message("no_floating_roof", "expected only with a floating roof: [roof]")
         if no_roof
         else "",
@@ -137,6 +140,32 @@ def _of_bottom(values, bottom):
     }.get(bottom_form(values, bottom), "")
 
 
+def _of_heads(values, bottom):
+    """Sizes of a shaped bottom and of a head on top, where they are on."""
+    form, top = bottom_form(values, bottom), values["top"]["form"]
+    off = {part: values["corrections"][part] is False for part in ("bottom", "top")}
+    heads = [
+        {**values[part], "form": shape, "depth_m": values[part][key]}
+        for part, shape, key in (("bottom", form, "centre_z_m"), ("top", top, "depth_m"))
+        if shape == "torispherical" and not off[part]
+    ]
+    no_radius = message(
+        "no_such_radius", "expected only with a torispherical end that is given by this radius"
+    )
+    shaped = form in SHAPED and not off["bottom"]
+    headed = top is not None and not off["top"]
+    return {
+        **{f"{name}_radius": "" if any(gives(name, one) for one in heads) else no_radius
+           for name in GIVEN},
+        "bottom_depth": ""
+        if shaped
+        else message("no_shaped_bottom", "expected only with a bottom that is a cone or a head"),
+        "top_depth": ""
+        if headed
+        else message("no_top", "expected only with a head on the shell: [top]"),
+    }
+
+
 def _of_plates(values, tables, is_loaded):
     """Plates count where they are subtracted or loaded, paint where it is subtracted.
 
@@ -161,8 +190,9 @@ def _of_plates(values, tables, is_loaded):
     return why
 
 
-def _of_heights(courses):
-    is_one = courses is not None and len(courses.rows) + courses.skipped == 1
+def _of_heights(courses, values):
+    headed = values["top"]["form"] is not None and values["corrections"]["top"] is not False
+    is_one = not headed and courses is not None and len(courses.rows) + courses.skipped == 1
     return message("only_one_course", "expected only with two courses or more") if is_one else ""
 
 
@@ -175,11 +205,35 @@ def _of_horizontal(values, has_points):
         "end_depth": message("ends_are_flat", "expected only with an end that is not flat")
         if all_flat
         else "",
+        **_of_radii_of_ends(given),
+        "tube_angle": _of_tube(given),
+        "tube_offset": _of_tube(given),
         "tilt": _from_points(has_points) or switched_off,
         "dip_position": ""
         if leans
         else message("does_not_lean", "expected only for a tank that leans"),
     }
+
+
+def _of_radii_of_ends(given):
+    """Radii that the job gives, or a standard."""
+    why = message(
+        "no_such_radius", "expected only with a torispherical end that is given by this radius"
+    )
+    ends = [{key: given[f"end_{end}_{key}"] for key in SIZES_OF_END} for end in "ab"]
+    return {f"{name}_radius": "" if any(gives(name, end) for end in ends) else why for name in GIVEN}
+
+
+def gives(name, end):
+    """Is a radius, "dish" or "knuckle", among the sizes that an end or a head is given by?"""
+    by_standard = end["standard"] and (name == "knuckle" or not end["depth_m"])
+    return bool(end[f"{name}_radius_m"] or by_standard)
+
+
+def _of_tube(given):
+    if None in (given["width_m"], given["height_m"]):
+        return ""
+    return message("tube_round_only", "expected only for a round cylinder: diameter_m, or points.csv")
 
 
 def _of_wall(given, values, has_points):

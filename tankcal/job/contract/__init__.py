@@ -20,6 +20,7 @@ from tankcal.job.contract import (
     stated,
     strapping,
     tangents,
+    top,
     uncertainty,
     welds,
 )
@@ -34,7 +35,8 @@ from tankcal.job.contract.uncertainty import INPUTS
 from tankcal.text.form_words import NOTES
 
 SECTIONS = (
-    *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "bottom", "roof"),
+    *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh"),
+    *("bottom", "top", "roof"),
     *("shell", "strapping", "liquid", "radii", "change"),
     *("corrections", "material", "checks"),
     *("adjustment", "adjustment.camera", "certificate"),
@@ -45,7 +47,7 @@ COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES}
 COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | tangents.COLUMNS | stadia.COLUMNS
 COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS | SURVEY_COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS | radii.KEYS
-_KEYS |= {"bottom": bottom.KEYS, "roof": roof.KEYS}
+_KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
 
 SURVEYS = ADJUSTED_SURVEYS | {

@@ -1,6 +1,7 @@
 """uncertainty.csv: what it may declare, what is assumed without it, its columns and its checks."""
 
 from dataclasses import dataclass
+from math import pi
 
 from tankcal.gum.distributions import FAMILIES, expanded, within
 from tankcal.job.checking import refuse_repeated
@@ -104,6 +105,24 @@ INPUTS = {
     ),
     "length": _of_lying("mm", 1e3, 500, "length of the horizontal cylinder"),
     "end_depth": _of_lying("mm", 1e3, 500, "depth of both ends, the same error"),
+    "dish_radius": Declarable(
+        "mm",
+        1e3,
+        500,
+        "radius of the dish of torispherical ends and heads, where it is given, the same error",
+        ("vertical", "horizontal"),
+    ),
+    "knuckle_radius": Declarable(
+        "mm",
+        1e3,
+        200,
+        "radius of the knuckle of torispherical ends and heads, where it is given, the same error",
+        ("vertical", "horizontal"),
+    ),
+    "bottom_depth": _of_shell(
+        "mm", 1e3, 500, "depth of a shaped bottom from its edge to its middle"
+    ),
+    "top_depth": _of_shell("mm", 1e3, 500, "rise of the head on top over the shell"),
     "tilt": Declarable(
         "mm/m",
         1e3,
@@ -112,6 +131,8 @@ INPUTS = {
         ("vertical", "horizontal"),
     ),
     "dip_position": _of_lying("mm", 1e3, 2000, "place of the dip point along the axis"),
+    "tube_angle": _of_lying("deg", 180 / pi, 10, "angle of the gauge tube off the plumb"),
+    "tube_offset": _of_lying("mm", 1e3, 500, "place of the gauge tube across the axis"),
     "surface": Declarable("mm", 1e3, 200, "offset of the mesh's surface from the wall", ("mesh",)),
     "interpolation": Declarable(
         "m3", 1, 100, "straight line between two rows, of each reading", correlates=False

@@ -13,6 +13,7 @@ from tankcal.job.model.parts import (
     Mesh,
     Roof,
     Sphere,
+    Top,
 )
 from tankcal.job.model.radii import Change, Radii
 from tankcal.job.model.settings import (
@@ -57,6 +58,7 @@ __all__ = [
     "Switches",
     "TableSpec",
     "Tank",
+    "Top",
 ]
 
 
@@ -87,6 +89,8 @@ class Job:
         In the order of the file.
     roof : Roof or None
         None without a floating roof.
+    top : Top or None
+        Head on a vertical tank; None: its table ends with the shell.
     horizontal, sphere, mesh
         None for the other kinds of tank.
     measurements : Measurements or None
@@ -160,3 +164,4 @@ class Job:
     liquid: Metering | None = None
     radii: Radii | None = None
     change: Change | None = None
+    top: Top | None = None

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from tankcal.tank.fittings import deadwood
 
 LEARNED, HALF_LEARNED = 0.1, 0.5  # share of a variance's logarithm that is assumed, at most
@@ -34,8 +36,27 @@ def estimates_of(job):
         "survey_density": survey.liquid_density_kg_m3,
         "roof_mass": job.roof and job.roof.mass_kg,
         **_of_solid(job),
+        **_of_heads(job),
     }
     return {name: value for name, value in given.items() if value is not None}
+
+
+def _of_heads(job):
+    """Sizes of the bottom of an upright tank, and of the head on it, as they were given."""
+    if job.tank.kind != "vertical":
+        return {}
+    centre, top = job.bottom.centre_z_m, job.top
+    heads = [one for one in (job.bottom, top) if one is not None]
+    dishes, knuckles = (
+        [1000 * getattr(one, key) for one in heads if getattr(one, key)]
+        for key in ("dish_radius_m", "knuckle_radius_m")
+    )
+    return {
+        "bottom_depth": None if centre is None else 1000 * abs(centre - job.datum.bottom_z_m),
+        "top_depth": top and _thousand(top.depth_m),
+        "dish_radius": _only(dishes),
+        "knuckle_radius": _only(knuckles),
+    }
 
 
 def _of_solid(job):
@@ -47,14 +68,22 @@ def _of_solid(job):
     if lying is None:
         return {**plate, "diameter": _thousand(solid.diameter_m)}
     round_m = lying.width_m if lying.width_m == lying.height_m else None
-    depths = [end.depth_m for end in (lying.end_a, lying.end_b) if end.depth_m]
+    ends = (lying.end_a, lying.end_b)
+    depths, dishes, knuckles = (
+        [1000 * getattr(end, key) for end in ends if getattr(end, key)]
+        for key in ("depth_m", "dish_radius_m", "knuckle_radius_m")
+    )
     return {
         **plate,
         "diameter": _thousand(round_m),
         "length": _thousand(lying.length_m),
-        "end_depth": _only([1000 * depth for depth in depths]),
+        "end_depth": _only(depths),
+        "dish_radius": _only(dishes),
+        "knuckle_radius": _only(knuckles),
         "tilt": _thousand(lying.tilt),
         "dip_position": _thousand(lying.dip_from_a_m),
+        "tube_angle": lying.tube_angle_rad and float(np.degrees(lying.tube_angle_rad)),
+        "tube_offset": _thousand(lying.tube_offset_m),
     }
 
 

@@ -73,7 +73,7 @@ def _rings(z):
 
 
 RADII = (("dish_radius_m", DISH_RADIUS), ("knuckle_radius_m", KNUCKLE_RADIUS))
-ALIKE = dict.fromkeys(END_DEPTH, ("depth_m",)) | {"torispherical": [name for name, _ in RADII]}
+ALIKE = dict.fromkeys(END_DEPTH, ("depth_m",)) | {"torispherical": ("depth_m", *(name for name, _ in RADII))}
 
 
 def check_sizes(values, kind, raw, log):

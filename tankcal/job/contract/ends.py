@@ -1,0 +1,216 @@
+"""Ends of lying tanks and heads of upright ones: keys of their sizes, and what goes together."""
+
+from tankcal.job.checking import is_not_given, tell
+from tankcal.job.contract.shorthand import choice, positive
+from tankcal.messages import message
+from tankcal.tank.heads import KINDS, STANDARDS
+
+HORIZONTAL_ONLY = ("horizontal",)
+RADII = ("dish_radius_m", "knuckle_radius_m")
+DEEPEST_END = 2.0  # diameters
+ROUND_ONLY = ("torispherical", "spherical", "guppy")
+
+
+def end_keys(letter):
+    """The keys of one end of a horizontal cylinder."""
+    name = f"end {letter.upper()}"
+    return (
+        choice(f"end_{letter}", f"form of {name}", KINDS, required=True, kinds=HORIZONTAL_ONLY),
+        positive(
+            f"end_{letter}_depth_m",
+            f"{name}: depth along the axis, metres; not of flat ends",
+            20,
+            kinds=HORIZONTAL_ONLY,
+        ),
+        *torispherical_keys(f"end_{letter}_", f"{name}: ", HORIZONTAL_ONLY),
+    )
+
+
+def torispherical_keys(prefix, name, kinds):
+    """Keys of the sizes that torispherical ends and heads alone have.
+
+    Parameters
+    ----------
+    prefix : str
+        Of the keys.
+    name : str
+        Before the notes.
+    kinds : tuple of str
+        Of tanks.
+    """
+    return (
+        positive(
+            f"{prefix}dish_radius_m",
+            f"{name}radius of the dish, metres; torispherical only",
+            100,
+            kinds=kinds,
+        ),
+        positive(
+            f"{prefix}knuckle_radius_m",
+            f"{name}radius of the knuckle, metres; torispherical only",
+            20,
+            kinds=kinds,
+        ),
+        choice(
+            f"{prefix}standard",
+            f"{name}standard that both radii follow from by the diameter; torispherical only",
+            tuple(STANDARDS),
+            kinds=kinds,
+        ),
+    )
+
+
+def check_end(given, end, has_points, raw, log):
+    """Form and sizes of one end of a horizontal cylinder, "end_a" or "end_b"."""
+
+    def tell_problem(key, expected):
+        tell(log.problem, raw, "horizontal", key, expected)
+
+    form, depth, key = given[end], given[f"{end}_depth_m"], f"{end}_depth_m"
+    height = given["height_m"] or given["diameter_m"]
+    width = given["width_m"] or given["diameter_m"]
+    if form is None:
+        return
+    if form in ROUND_ONLY and None not in (height, width) and height != width:
+        expected = message(
+            "round_ends_only",
+            "found {form}; expected another form: this one is for round cylinders only",
+            form=form,
+        )
+        tell_problem(end, expected)
+    if form not in ("flat", "torispherical") and is_not_given(raw, "horizontal", key):
+        expected = message(
+            "end_depth_missing", "missing; expected the depth of the {form} end", form=form
+        )
+        tell_problem(key, expected)
+    if depth is not None and form == "flat":
+        expected = message(
+            "end_has_no_depth",
+            "given for a {form} end; expected a blank: such an end has no depth",
+            form=form,
+        )
+        tell_problem(key, expected)
+    elif depth is not None and height is not None and form != "torispherical":
+        deepest = height / 2 if form == "spherical" else DEEPEST_END * height
+        if depth > deepest * (1 + 1e-9):
+            tell_problem(key, _too_deep(depth, deepest, form))
+    diameter = None if has_points else height
+    check_radii("horizontal", given, form, key, depth, diameter, raw, log, prefix=f"{end}_")
+
+
+def _too_deep(depth, deepest, form):
+    return message(
+        "end_too_deep",
+        "found {depth:g}; expected at most {deepest:g} m for a {form} end",
+        depth=depth,
+        deepest=deepest,
+        form=form,
+    )
+
+
+def check_radii(section, given, form, depth_key, depth, diameter, raw, log, *, prefix=""):
+    """Sizes of a torispherical end or head: two of three, or a standard; none of another form.
+
+    Parameters
+    ----------
+    section : str
+        Of job.toml.
+    given : dict
+        Its values.
+    form : str
+        Of the end.
+    depth_key : str
+        Key that the depth is given by.
+    depth : float or None
+        From the edge to the tip, m.
+    diameter : float or None
+        m; None: not known yet.
+    raw, log
+        Of the job.
+    prefix : str, optional
+        Of the keys.
+    """
+    names = {name: f"{prefix}{name}" for name in (*RADII, "standard")}
+    if form != "torispherical":
+        for key in names.values():
+            if given[key] is not None:
+                expected = message(
+                    "end_radius_unused",
+                    "given for a {form} end; expected only for a torispherical one",
+                    form=form,
+                )
+                tell(log.problem, raw, section, key, expected)
+        return
+    has_depth = not is_not_given(raw, section, depth_key)
+    there = [name for name in RADII if not is_not_given(raw, section, names[name])]
+    if not is_not_given(raw, section, names["standard"]):
+        for name in there:
+            expected = message(
+                "end_radius_beside_standard",
+                "given together with {standard}, which determines it; expected only one of them",
+                standard=names["standard"],
+            )
+            tell(log.problem, raw, section, names[name], expected)
+        there = [] if given[names["standard"]] is None else ["standard"]
+    elif has_depth and not there:
+        expected = message(
+            "end_depth_alone",
+            "missing; expected it beside the depth of a torispherical end, or one of its radii",
+        )
+        tell(log.problem, raw, section, names["standard"], expected)
+    elif not has_depth:
+        for name in RADII:
+            if name not in there:
+                expected = message(
+                    "end_radius_missing", "missing; expected for a torispherical end"
+                )
+                tell(log.problem, raw, section, names[name], expected)
+    elif len(there) == 2:
+        expected = message(
+            "end_sizes_over",
+            "given together with both radii; expected two of these three sizes of a torispherical "
+            "end: they determine the third",
+        )
+        tell(log.problem, raw, section, depth_key, expected)
+        return
+    if diameter is not None and there:
+        _check_sizes(section, given, names, there, depth_key, depth, diameter, raw, log)
+
+
+def _check_sizes(section, given, names, there, depth_key, depth, diameter, raw, log):
+    """Radii and depth against the diameter."""
+    dish, knuckle = (given[names[name]] for name in RADII)
+    half = diameter / 2
+    if dish is not None and dish <= half:
+        expected = message(
+            "dish_too_small",
+            "found {dish:g}; expected more than half the diameter, {half:g} m",
+            dish=dish,
+            half=half,
+        )
+        tell(log.problem, raw, section, names["dish_radius_m"], expected)
+        return
+    if knuckle is not None and knuckle > half:
+        expected = message(
+            "knuckle_too_large",
+            "found {knuckle:g}; expected at most half the diameter, {half:g} m",
+            knuckle=knuckle,
+            half=half,
+        )
+        tell(log.problem, raw, section, names["knuckle_radius_m"], expected)
+        return
+    if depth is None:
+        return
+    if there == ["standard"]:
+        knuckle = STANDARDS[given[names["standard"]]][1] * diameter
+    least = knuckle if dish is None else dish - (dish**2 - half**2) ** 0.5
+    if least is not None and not least < depth < half:
+        expected = message(
+            "end_depth_off_radius",
+            "{depth:g} m deep; expected more than {least:.4g} and less than {half:g} m for a "
+            "torispherical end of that radius",
+            depth=depth,
+            least=least,
+            half=half,
+        )
+        tell(log.problem, raw, section, depth_key, expected)
