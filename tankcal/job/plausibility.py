@@ -401,7 +401,7 @@ TABLE = (
         ("length_strange", "length_impossible"),
     ),
     Plausible(
-        "horizontal.end_a_depth_m, horizontal.end_b_depth_m",
+        "horizontal.end_a_depth_m, horizontal.end_b_depth_m, top.depth_m",
         "over the diameter: "
         + ", ".join(_of_ends(form) for form in END_DEPTH)
         + "; two ends of one form differ by less than"

@@ -9,7 +9,7 @@ from tankcal.messages import message
 from tankcal.tank.arcs import EllipseArc, Line
 
 KINDS = ("flat", "conical", "ellipsoidal", "torispherical", "spherical", "guppy")
-RADII = ("dish_radius", "knuckle_radius")  # inputs that a torispherical end may be given by
+RADII = ("dish", "knuckle")  # inputs that a torispherical end may be given by
 STANDARDS = {  # torispherical: radii of dish and knuckle over the diameter
     "asme": (1.0, 0.06),
     "din_28011": (1.0, 0.1),
@@ -256,8 +256,8 @@ def _torispherical_inputs(end, radius_m, dish, knuckle):
     h = dish - reach
     free = {  # by each of R, f, k, the two others held
         "radius": np.array([[0.0, 1, 0, 0], [inner / reach, 0, 0, 0]]),
-        "dish_radius": np.array([[0.0, 0, 0, 0], [(knuckle - dish) / reach, 0, 1, 1]]),
-        "knuckle_radius": np.array([[0.0, -1, 1, 1], [(dish - radius_m) / reach, 0, 0, 0]]),
+        "dish": np.array([[0.0, 0, 0, 0], [(knuckle - dish) / reach, 0, 1, 1]]),
+        "knuckle": np.array([[0.0, -1, 1, 1], [(dish - radius_m) / reach, 0, 0, 0]]),
     }
     if not end.depth_m:
         stretch = np.array([[0.0, 0, knuckle / h, 0], [-reach / h, 0, dish / h, 0]])
@@ -265,8 +265,8 @@ def _torispherical_inputs(end, radius_m, dish, knuckle):
     else:
         of_depth = {  # dh by each of them
             "radius": inner / reach,
-            "dish_radius": 1 - (dish - knuckle) / reach,
-            "knuckle_radius": (dish - radius_m) / reach,
+            "dish": 1 - (dish - knuckle) / reach,
+            "knuckle": (dish - radius_m) / reach,
         }
         follows = RADII[end.dish_radius_m is not None]
         slope = of_depth[follows]

@@ -75,7 +75,7 @@ class Tip:
         """{input: (rows,)} of `beyond_m3` at fixed x, m3 per SI unit, other given sizes held.
 
         "scale" stretches the plan; "depth" moves the tip away from the edge, and stretches a
-        torispherical head of given radii; "dish_radius", "knuckle_radius" where they were given.
+        torispherical head of given radii; "dish", "knuckle" where they were given.
         """
         s, h, plan = self.depth_m - x_m, self.depth_m, self.plan_m2
         if self.form == "cone":

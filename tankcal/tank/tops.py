@@ -62,7 +62,7 @@ class HeadedShell(Part):
     def derivatives(self, levels_m):
         """{input: (rows,)} those of the shell, of the plan of the head, and of its sizes.
 
-        "top_depth" lifts the tip over its edge; "dish_radius" and "knuckle_radius" are those of a
+        "top_depth" lifts the tip over its edge; "dish" and "knuckle" are those of a
         torispherical head that was given by them. A higher course lifts the whole head.
         """
         below, x = self._split(levels_m)
@@ -129,7 +129,8 @@ class HeadedShell(Part):
         of_readings = {name: float(weights @ by) for name, by in shell.read_with.items()}
         departures = {
             name: float(
-                weights @ np.concatenate([one.girths_m * one.missed[name] for one in volume.courses])
+                weights
+                @ np.concatenate([one.girths_m * one.missed[name] for one in volume.courses])
             )
             for name in volume.departures
         }

@@ -130,13 +130,13 @@ def test_a_standard_end_of_a_measured_depth_keeps_its_knuckle():
 
 
 GIVEN = {
-    "radii": ("dish_radius", "knuckle_radius"),
-    "dish": ("end_depth", "dish_radius"),
-    "knuckle": ("end_depth", "knuckle_radius"),
+    "radii": ("dish", "knuckle"),
+    "dish": ("end_depth", "dish"),
+    "knuckle": ("end_depth", "knuckle"),
 }
 FIELDS = {
-    "dish_radius": "dish_radius_m",
-    "knuckle_radius": "knuckle_radius_m",
+    "dish": "dish_radius_m",
+    "knuckle": "knuckle_radius_m",
     "end_depth": "depth_m",
 }
 

@@ -133,7 +133,7 @@ def test_derivatives_of_bottoms_by_their_sizes(given, way):
     form, sizes = given.split()[0], GIVEN[given]
     if way > 0 and not sizes[0]:
         pytest.skip("a torispherical bottom of given radii bulges down")
-    inputs = [("bottom_depth", 0), ("dish_radius", 1), ("knuckle_radius", 2)]
+    inputs = [("bottom_depth", 0), ("dish", 1), ("knuckle", 2)]
     inputs = [(name, place) for name, place in inputs if sizes[place]]
     between = LEVELS[np.abs(LEVELS) > 0.05]
 
@@ -213,7 +213,7 @@ ABOVE = np.array([1.0, 3.9, 4.05, 4.2, 4.35])
 def test_derivatives_of_a_headed_shell(form):
     """By level, plan, course heights and sizes; stretch and scale by temperature."""
     sizes = HEADS[form]
-    inputs = [("top_depth", 0), ("dish_radius", 1), ("knuckle_radius", 2)]
+    inputs = [("top_depth", 0), ("dish", 1), ("knuckle", 2)]
     inputs = [(name, place) for name, place in inputs if sizes[place]]
 
     def volume(x):
@@ -299,4 +299,4 @@ def test_a_standard_head_of_a_measured_depth():
     end = standard_end(End("torispherical", 0.59), "din_28011", D)
     tip = tip_of("torispherical", PLAN, end.depth_m, end.dish_radius_m, end.knuckle_radius_m)
     assert tip.depth_m == 0.59
-    assert tip.sizes_m == {"depth": 0.59, "knuckle_radius": pytest.approx(0.3)}
+    assert tip.sizes_m == {"depth": 0.59, "knuckle": pytest.approx(0.3)}

@@ -11,10 +11,14 @@ from tankcal.job.checks.extent import (
 )
 from tankcal.job.contract import INPUTS
 from tankcal.job.contract.bottom import SHAPED, bottom_form
+from tankcal.job.contract.lying import ROUND_TUBE
 from tankcal.messages import message
 
 GIVEN = ("dish", "knuckle")
 SIZES_OF_END = ("depth_m", "dish_radius_m", "knuckle_radius_m", "standard")
+NO_SUCH_RADIUS = message(
+    "no_such_radius", "expected only with a torispherical end that is given by this radius"
+)
 NOT_SUBTRACTED = message(
     "nothing_subtracted",
     "expected only with side = outside: with side = inside nothing is subtracted",
@@ -149,14 +153,10 @@ def _of_heads(values, bottom):
         for part, shape, key in (("bottom", form, "centre_z_m"), ("top", top, "depth_m"))
         if shape == "torispherical" and not off[part]
     ]
-    no_radius = message(
-        "no_such_radius", "expected only with a torispherical end that is given by this radius"
-    )
     shaped = form in SHAPED and not off["bottom"]
     headed = top is not None and not off["top"]
     return {
-        **{f"{name}_radius": "" if any(gives(name, one) for one in heads) else no_radius
-           for name in GIVEN},
+        **_of_radii_of(heads),
         "bottom_depth": ""
         if shaped
         else message("no_shaped_bottom", "expected only with a bottom that is a cone or a head"),
@@ -217,14 +217,18 @@ def _of_horizontal(values, has_points):
 
 def _of_radii_of_ends(given):
     """Radii that the job gives, or a standard."""
-    why = message(
-        "no_such_radius", "expected only with a torispherical end that is given by this radius"
-    )
     ends = [{key: given[f"end_{end}_{key}"] for key in SIZES_OF_END} for end in "ab"]
-    return {f"{name}_radius": "" if any(gives(name, end) for end in ends) else why for name in GIVEN}
+    return _of_radii_of(ends)
 
 
-def gives(name, end):
+def _of_radii_of(heads):
+    return {
+        f"{name}_radius": "" if any(_gives(name, one) for one in heads) else NO_SUCH_RADIUS
+        for name in GIVEN
+    }
+
+
+def _gives(name, end):
     """Is a radius, "dish" or "knuckle", among the sizes that an end or a head is given by?"""
     by_standard = end["standard"] and (name == "knuckle" or not end["depth_m"])
     return bool(end[f"{name}_radius_m"] or by_standard)
@@ -233,7 +237,7 @@ def gives(name, end):
 def _of_tube(given):
     if None in (given["width_m"], given["height_m"]):
         return ""
-    return message("tube_round_only", "expected only for a round cylinder: diameter_m, or points.csv")
+    return ROUND_TUBE
 
 
 def _of_wall(given, values, has_points):

@@ -149,7 +149,11 @@ def depth_of_head(given, depth, diameter):
 
 
 def _check_centre(form, values, raw, log):
-    given, centre, edge = values["bottom"], values["bottom"]["centre_z_m"], values["datum"]["bottom_z_m"]
+    given, centre, edge = (
+        values["bottom"],
+        values["bottom"]["centre_z_m"],
+        values["datum"]["bottom_z_m"],
+    )
     diameter = values["tank"]["nominal_diameter_m"]
     if form not in SHAPED:
         if centre is not None:

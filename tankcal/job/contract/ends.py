@@ -79,10 +79,7 @@ def check_end(given, end, has_points, raw, log):
         )
         tell_problem(end, expected)
     if form not in ("flat", "torispherical") and is_not_given(raw, "horizontal", key):
-        expected = message(
-            "end_depth_missing", "missing; expected the depth of the {form} end", form=form
-        )
-        tell_problem(key, expected)
+        tell_problem(key, depth_missing(form))
     if depth is not None and form == "flat":
         expected = message(
             "end_has_no_depth",
@@ -93,12 +90,18 @@ def check_end(given, end, has_points, raw, log):
     elif depth is not None and height is not None and form != "torispherical":
         deepest = height / 2 if form == "spherical" else DEEPEST_END * height
         if depth > deepest * (1 + 1e-9):
-            tell_problem(key, _too_deep(depth, deepest, form))
+            tell_problem(key, too_deep(depth, deepest, form))
     diameter = None if has_points else height
     check_radii("horizontal", given, form, key, depth, diameter, raw, log, prefix=f"{end}_")
 
 
-def _too_deep(depth, deepest, form):
+def depth_missing(form):
+    """What is said of an end or a head without the depth that its form needs."""
+    return message("end_depth_missing", "missing; expected the depth of the {form} end", form=form)
+
+
+def too_deep(depth, deepest, form):
+    """What is said of an end or a head deeper than its form can be."""
     return message(
         "end_too_deep",
         "found {depth:g}; expected at most {deepest:g} m for a {form} end",

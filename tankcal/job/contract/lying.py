@@ -105,6 +105,9 @@ SPHERE = (
 KEYS = {"horizontal": HORIZONTAL, "sphere": SPHERE}
 
 STRONG_TILT_MM_PER_M = 50
+ROUND_TUBE = message(
+    "tube_round_only", "expected only for a round cylinder: diameter_m, or points.csv"
+)
 SIZES = ("diameter_m", "width_m", "height_m")
 
 
@@ -254,10 +257,7 @@ def _check_tube(given, has_points, raw, log):
     diameter = given["diameter_m"]
     for key in keys:
         if None not in (given["width_m"], given["height_m"]):
-            expected = message(
-                "tube_round_only", "expected only for a round cylinder: diameter_m, or points.csv"
-            )
-            tell(log.problem, raw, "horizontal", key, expected)
+            tell(log.problem, raw, "horizontal", key, ROUND_TUBE)
     if "tube_offset_m" in keys and diameter and abs(given["tube_offset_m"]) >= diameter / 2:
         expected = message(
             "tube_outside",

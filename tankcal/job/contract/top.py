@@ -2,12 +2,10 @@
 
 from tankcal.job.checking import is_not_given, missing_beside, tell
 from tankcal.job.contract.bottom import DEEPEST, SHAPED, depth_of_head
-from tankcal.job.contract.ends import check_radii, torispherical_keys
+from tankcal.job.contract.ends import check_radii, depth_missing, too_deep, torispherical_keys
 from tankcal.job.contract.kinds import VERTICAL
 from tankcal.job.contract.shorthand import choice, positive
-from tankcal.job.plausibility import END_DEPTH, HEMISPHERE
 from tankcal.messages import message
-from tankcal.tank.tips import FORMS
 
 KEYS = (
     choice(
@@ -35,7 +33,7 @@ def depth_of_top(values):
     return None if diameter is None else depth_of_head(given, given["depth_m"], diameter)
 
 
-def check_top(values, raw, log):
+def check_top(values, is_metered, raw, log):
     """The form with its sizes, nothing without it, and sizes that go with the diameter."""
     given, form, depth = values["top"], values["top"]["form"], values["top"]["depth_m"]
     diameter = values["tank"]["nominal_diameter_m"]
@@ -47,35 +45,18 @@ def check_top(values, raw, log):
         return
     if form is None:
         return
-    if form != "torispherical" and is_not_given(raw, "top", "depth_m"):
+    if is_metered:
         expected = message(
-            "end_depth_missing", "missing; expected the depth of the {form} end", form=form
+            "top_beside_liquid",
+            "given together with liquid.csv; expected a blank: metered runs tell the shell, and its"
+            " table ends with it",
         )
-        tell(log.problem, raw, "top", "depth_m", expected)
+        tell(log.problem, raw, "top", "form", expected)
+    if form != "torispherical" and is_not_given(raw, "top", "depth_m"):
+        tell(log.problem, raw, "top", "depth_m", depth_missing(form))
     check_radii("top", given, form, "depth_m", depth, diameter, raw, log)
     if None in (depth, diameter):
         return
     deepest = DEEPEST[form] * diameter
     if depth > deepest * (1 + 1e-9) and form != "torispherical":
-        expected = message(
-            "end_too_deep",
-            "found {depth:g}; expected at most {deepest:g} m for a {form} end",
-            depth=depth,
-            deepest=deepest,
-            form=form,
-        )
-        tell(log.problem, raw, "top", "depth_m", expected)
-        return
-    (least, most), ratio = END_DEPTH[FORMS[form]], depth / diameter
-    if not least <= ratio <= most and not (form == "dish" and ratio >= HEMISPHERE):
-        text = message(
-            "end_depth_strange",
-            "{found_m:g} m is {ratio:.3g} diameters, expected {least:g} to {most:g} for a"
-            " {form} end: is it the depth, and of one end?",
-            found_m=depth,
-            ratio=ratio,
-            least=least,
-            most=most,
-            form=form,
-        )
-        tell(log.warning, raw, "top", "depth_m", text)
+        tell(log.problem, raw, "top", "depth_m", too_deep(depth, deepest, form))

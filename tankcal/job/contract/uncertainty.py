@@ -105,14 +105,14 @@ INPUTS = {
     ),
     "length": _of_lying("mm", 1e3, 500, "length of the horizontal cylinder"),
     "end_depth": _of_lying("mm", 1e3, 500, "depth of both ends, the same error"),
-    "dish_radius": Declarable(
+    "dish": Declarable(
         "mm",
         1e3,
         500,
         "radius of the dish of torispherical ends and heads, where it is given, the same error",
         ("vertical", "horizontal"),
     ),
-    "knuckle_radius": Declarable(
+    "knuckle": Declarable(
         "mm",
         1e3,
         200,

@@ -33,8 +33,8 @@ VARIED = (
     "end_depth",
     "tilt",
     "dip_position",
-    "dish_radius",
-    "knuckle_radius",
+    "dish",
+    "knuckle",
     "tube_angle",
     "tube_offset",
     "bottom_depth",
@@ -116,8 +116,8 @@ def _of_solid(job, name, change):
 
 _OF_ENDS = {
     "end_depth": "depth_m",
-    "dish_radius": "dish_radius_m",
-    "knuckle_radius": "knuckle_radius_m",
+    "dish": "dish_radius_m",
+    "knuckle": "knuckle_radius_m",
 }
 
 

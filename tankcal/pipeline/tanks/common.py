@@ -54,8 +54,8 @@ def _of_heads(job):
     return {
         "bottom_depth": None if centre is None else 1000 * abs(centre - job.datum.bottom_z_m),
         "top_depth": top and _thousand(top.depth_m),
-        "dish_radius": _only(dishes),
-        "knuckle_radius": _only(knuckles),
+        "dish": _only(dishes),
+        "knuckle": _only(knuckles),
     }
 
 
@@ -78,8 +78,8 @@ def _of_solid(job):
         "diameter": _thousand(round_m),
         "length": _thousand(lying.length_m),
         "end_depth": _only(depths),
-        "dish_radius": _only(dishes),
-        "knuckle_radius": _only(knuckles),
+        "dish": _only(dishes),
+        "knuckle": _only(knuckles),
         "tilt": _thousand(lying.tilt),
         "dip_position": _thousand(lying.dip_from_a_m),
         "tube_angle": lying.tube_angle_rad and float(np.degrees(lying.tube_angle_rad)),
