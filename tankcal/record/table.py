@@ -10,6 +10,7 @@ from tankcal.record.liquid import geometry_beside
 from tankcal.record.schema import Finite, Saved, filled_from, key
 from tankcal.record.statements import intervals_of
 from tankcal.tank.dips import ProportionalParts, dip_label
+from tankcal.tank.heads import torispherical_radii
 
 LEAST_PART_M3 = 1e-4  # last place of a printed part: an error below it is not told apart
 
@@ -443,9 +444,12 @@ def _of_lying(result):
     ends = {}
     for name, end in (("a", tank.end_a), ("b", tank.end_b)):
         ends[f"end_{name}"] = (end.kind, None)
+        dish, knuckle = end.dish_radius_m, end.knuckle_radius_m
+        if end.kind == "torispherical":
+            dish, knuckle = torispherical_radii(tank.height_m / 2, end.depth_m, dish, knuckle)
         ends[f"end_{name}_depth"] = (end.depth_m or None, "m")
-        ends[f"end_{name}_dish_radius"] = (end.dish_radius_m, "m")
-        ends[f"end_{name}_knuckle_radius"] = (end.knuckle_radius_m, "m")
+        ends[f"end_{name}_dish_radius"] = (dish, "m")
+        ends[f"end_{name}_knuckle_radius"] = (knuckle, "m")
     return described(
         section_width=(tank.width_m, "m"),
         section_height=(tank.height_m, "m"),

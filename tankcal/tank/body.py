@@ -319,7 +319,7 @@ class Body:
 
     def only_shell(self):
         """The body of the shell of courses alone."""
-        return replace(self, parts=(self.shell,))
+        return replace(self, parts=(self.shell,), highest_m=self.shell.volume.height_m)
 
     def undeclared(self):
         """Names of the inputs that move some volume of the tank and have no declared u.

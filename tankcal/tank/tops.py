@@ -124,13 +124,14 @@ class HeadedShell(Part):
     def _plan_by(self):
         """{input: derivative of the plan of the head by it, m2 per SI unit}."""
         shell, volume = self.shell, self.shell.volume
+        courses = volume.courses
         weights, scale = volume.top_weights, 2 * self.tip.plan_m2 / shell.scale
         girth = float(weights @ volume.girth_features)
         of_readings = {name: float(weights @ by) for name, by in shell.read_with.items()}
         departures = {
-            name: float(
-                weights
-                @ np.concatenate([one.girths_m * one.missed[name] for one in volume.courses])
+            name: sum(
+                float(own @ (one.girths_m * one.missed[name]))
+                for own, one in zip(np.split(weights, len(courses)), courses, strict=True)
             )
             for name in volume.departures
         }

@@ -1,6 +1,7 @@
 """Heads of upright tanks: closed forms, another program, meshes, differences; tops on a shell."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -177,7 +178,7 @@ def shell_of(radius=R, scale=1.0, stretch=1.0, bearing=(), heights=(2.5, 1.5), i
     edges = stretch * np.concatenate([[0.0], np.cumsum(heights)])
     courses = tuple(
         course_of(low, high, lambda z: radius, inset_m=inset, scale=scale)
-        for low, high in zip(edges[:-1], edges[1:], strict=True)
+        for low, high in pairwise(edges)
     )
     volume = ShellVolume(courses)
     factor = Factor("points", 1e-3 * np.eye(len(volume.features)))

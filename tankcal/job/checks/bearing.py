@@ -223,8 +223,7 @@ def _of_radii_of_ends(given):
 
 def _of_radii_of(heads):
     return {
-        f"{name}_radius": "" if any(_gives(name, one) for one in heads) else NO_SUCH_RADIUS
-        for name in GIVEN
+        name: "" if any(_gives(name, one) for one in heads) else NO_SUCH_RADIUS for name in GIVEN
     }
 
 

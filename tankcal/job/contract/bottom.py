@@ -24,8 +24,8 @@ KEYS = (
     ),
     number(
         "centre_z_m",
-        "cone, dish, ellipsoidal, torispherical: z of the centre, in the frame of the points, metres;"
-        " the edge is at datum.bottom_z_m",
+        "cone, dish, ellipsoidal, torispherical: z of the centre, in the frame of the points,"
+        " metres; the edge is at datum.bottom_z_m",
         -1e5,
         1e5,
         kinds=VERTICAL,
@@ -149,11 +149,8 @@ def depth_of_head(given, depth, diameter):
 
 
 def _check_centre(form, values, raw, log):
-    given, centre, edge = (
-        values["bottom"],
-        values["bottom"]["centre_z_m"],
-        values["datum"]["bottom_z_m"],
-    )
+    given, edge = values["bottom"], values["datum"]["bottom_z_m"]
+    centre = given["centre_z_m"]
     diameter = values["tank"]["nominal_diameter_m"]
     if form not in SHAPED:
         if centre is not None:

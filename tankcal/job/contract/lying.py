@@ -73,8 +73,8 @@ HORIZONTAL = (
     ),
     number(
         "tube_angle_deg",
-        "gauge tube of a round tank that was rolled: its angle off the plumb, in the plane square to"
-        " the axis, degrees; above 0: its top leans to the right, seen from A; blank: 0",
+        "gauge tube of a round tank that was rolled: its angle off the plumb, in the plane square"
+        " to the axis, degrees; above 0: its top leans to the right, seen from A; blank: 0",
         -60,
         60,
         kinds=HORIZONTAL_ONLY,

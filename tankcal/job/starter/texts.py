@@ -68,7 +68,7 @@ SECTION_NOTES = {
     "sphere": "the sphere; its size as measured, inside or outside (survey.side)",
     "mesh": "the closed surface of the inside",
     "bottom": "what the bottom is like; see bottom.csv, too",
-    "top": "the head on the shell, which liquid may rise into; blank: the table ends with the shell",
+    "top": "the head on top, which liquid may rise into; blank: the table ends with the shell",
     "roof": "the floating roof: all of it, or nothing when there is none",
     "corrections": "false switches a correction off, and the report says so",
     "material": "the shell's steel",
