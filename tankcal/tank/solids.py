@@ -141,7 +141,7 @@ class LyingTank(Part):
     def top_m(self):
         """The highest dip."""
         if self._has_tube:
-            return self._tube.full_m / self._stretch
+            return self._tube.full_m * self._stretch
         return 2 * self._half_height_m * self._stretch
 
     def depth_m(self, levels_m):
@@ -150,8 +150,8 @@ class LyingTank(Part):
         return self._tube.depth_m(along) if self._has_tube else along
 
     def height_share(self, levels_m):
-        """(rows,) depth of each dip as a share of the height of the section, and its slope."""
-        high = 2 * self._half_height_m
+        """(rows,) the plumb dip of each depth as a share of the highest one, and its slope."""
+        high = 2 * self._half_height_m * self._stretch**2  # of the depth at that dip
         return self.depth_m(levels_m) / high, self._stretch * self._tube.slope / high
 
     @cached_property

@@ -136,3 +136,13 @@ def test_any_tube_fills_monotonically():
         volume = tank.volume_m3(dips)
         assert np.diff(volume).min() > -1e-12
         assert volume[-1] <= tank.capacity_m3 * (1 + 1e-12)
+
+
+def test_a_tube_hardly_off_the_axis_has_the_table_of_a_plumb_one():
+    """Property: no jump, in a tank that is tilted, too."""
+    sizes = {"tilt": 0.05, "dip_from_a_m": 2.0}
+    plumb, beside = (LyingTank(2.0, 2.0, 5.0, tube_offset_m=e, **sizes) for e in (0.0, 1e-9))
+    assert beside.top_m == pytest.approx(plumb.top_m, rel=1e-12)
+    dips = np.linspace(0, 2, 9)
+    assert beside.volume_m3(dips) == pytest.approx(plumb.volume_m3(dips), rel=1e-12)
+    assert beside.height_share(dips)[0] == pytest.approx(plumb.height_share(dips)[0], rel=1e-12)
