@@ -121,6 +121,7 @@ TOPS = {
 }
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("form", BOTTOMS)
 def test_upright_tanks_on_heads_run_to_the_table(tmp_path, form):
     """Closed forms of `tips`, proved there; the dip plate at the lowest point."""
@@ -137,6 +138,7 @@ def test_upright_tanks_on_heads_run_to_the_table(tmp_path, form):
     assert set(inputs) <= {one.kind for one in found.table.sources}
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("form", TOPS)
 def test_upright_tanks_with_heads_on_top_run_to_the_table(tmp_path, form):
     sizes, given, inputs = TOPS[form]
@@ -167,6 +169,7 @@ def test_a_head_that_is_switched_off_is_told_and_not_taken(tmp_path):
     assert correction.size_m3 > 0
 
 
+@pytest.mark.slow
 def test_a_head_with_liquid_temperature_and_everything(tmp_path):
     """Parts add up: gross and corrections are the last row."""
     settings = {

@@ -2,14 +2,12 @@
 
 import numpy as np
 
-from tankcal.errors import SolutionError
 from tankcal.job.checking import has_rows, is_not_given, places_of, tell, zero_z
-from tankcal.job.contract.ends import check_radii, torispherical_keys
+from tankcal.job.contract.ends import check_radii, depth_of_head, torispherical_keys
 from tankcal.job.contract.kinds import VERTICAL
 from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.fields import Field
 from tankcal.messages import message
-from tankcal.tank.heads import End, depth_of, standard_end
 from tankcal.tank.tips import FORMS as TIPS
 
 OF_CLOUD = "cloud"  # the form that scans of the job show
@@ -133,19 +131,6 @@ def rise_of_bottom(values):
         return None if edge is None else given["centre_z_m"] - edge
     depth = None if diameter is None else depth_of_head(given, None, diameter)
     return None if depth is None else -depth
-
-
-def depth_of_head(given, depth, diameter):
-    """Depth of the head of an upright tank, m: as given, or by its radii; None: not known."""
-    if depth is not None or given["form"] != "torispherical":
-        return depth
-    end = End("torispherical", 0.0, given["dish_radius_m"], given["knuckle_radius_m"])
-    if given["standard"] is not None:
-        end = standard_end(End("torispherical"), given["standard"], diameter)
-    try:
-        return depth_of(end, diameter / 2)
-    except SolutionError:  # told by the checks of its sizes
-        return None
 
 
 def _check_centre(form, values, raw, log):

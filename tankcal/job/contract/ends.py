@@ -1,9 +1,10 @@
 """Ends of lying tanks and heads of upright ones: keys of their sizes, and what goes together."""
 
+from tankcal.errors import SolutionError
 from tankcal.job.checking import is_not_given, tell
 from tankcal.job.contract.shorthand import choice, positive
 from tankcal.messages import message
-from tankcal.tank.heads import KINDS, STANDARDS
+from tankcal.tank.heads import KINDS, STANDARDS, End, depth_of, standard_end
 
 HORIZONTAL_ONLY = ("horizontal",)
 RADII = ("dish_radius_m", "knuckle_radius_m")
@@ -144,45 +145,46 @@ def check_radii(section, given, form, depth_key, depth, diameter, raw, log, *, p
                 )
                 tell(log.problem, raw, section, key, expected)
         return
+    there, problems = _told_sizes(section, names, depth_key, raw)
+    for key, expected in problems:
+        tell(log.problem, raw, section, key, expected)
+    if diameter is not None and there:
+        values = {name: given[key] for name, key in names.items()}
+        _check_sizes(section, values, names, there, depth_key, depth, diameter, raw, log)
+
+
+def _told_sizes(section, names, depth_key, raw):
+    """(what gives the radii: their names or "standard"; [(key, what is wrong)]) of what is said."""
     has_depth = not is_not_given(raw, section, depth_key)
     there = [name for name in RADII if not is_not_given(raw, section, names[name])]
     if not is_not_given(raw, section, names["standard"]):
-        for name in there:
-            expected = message(
-                "end_radius_beside_standard",
-                "given together with {standard}, which determines it; expected only one of them",
-                standard=names["standard"],
-            )
-            tell(log.problem, raw, section, names[name], expected)
-        there = [] if given[names["standard"]] is None else ["standard"]
-    elif has_depth and not there:
-        expected = message(
+        beside = message(
+            "end_radius_beside_standard",
+            "given together with {standard}, which determines it; expected only one of them",
+            standard=names["standard"],
+        )
+        return ["standard"], [(names[name], beside) for name in there]
+    if has_depth and not there:
+        alone = message(
             "end_depth_alone",
             "missing; expected it beside the depth of a torispherical end, or one of its radii",
         )
-        tell(log.problem, raw, section, names["standard"], expected)
-    elif not has_depth:
-        for name in RADII:
-            if name not in there:
-                expected = message(
-                    "end_radius_missing", "missing; expected for a torispherical end"
-                )
-                tell(log.problem, raw, section, names[name], expected)
-    elif len(there) == 2:
-        expected = message(
+        return [], [(names["standard"], alone)]
+    if has_depth and len(there) == 2:
+        over = message(
             "end_sizes_over",
             "given together with both radii; expected two of these three sizes of a torispherical "
             "end: they determine the third",
         )
-        tell(log.problem, raw, section, depth_key, expected)
-        return
-    if diameter is not None and there:
-        _check_sizes(section, given, names, there, depth_key, depth, diameter, raw, log)
+        return [], [(depth_key, over)]
+    missing = message("end_radius_missing", "missing; expected for a torispherical end")
+    lacking = [] if has_depth else [name for name in RADII if name not in there]
+    return there, [(names[name], missing) for name in lacking]
 
 
-def _check_sizes(section, given, names, there, depth_key, depth, diameter, raw, log):
+def _check_sizes(section, values, names, there, depth_key, depth, diameter, raw, log):
     """Radii and depth against the diameter."""
-    dish, knuckle = (given[names[name]] for name in RADII)
+    dish, knuckle = (values[name] for name in RADII)
     half = diameter / 2
     if dish is not None and dish <= half:
         expected = message(
@@ -205,7 +207,9 @@ def _check_sizes(section, given, names, there, depth_key, depth, diameter, raw, 
     if depth is None:
         return
     if there == ["standard"]:
-        knuckle = STANDARDS[given[names["standard"]]][1] * diameter
+        if values["standard"] is None:  # no such word: told already
+            return
+        knuckle = STANDARDS[values["standard"]][1] * diameter
     least = knuckle if dish is None else dish - (dish**2 - half**2) ** 0.5
     if least is not None and not least < depth < half:
         expected = message(
@@ -217,3 +221,16 @@ def _check_sizes(section, given, names, there, depth_key, depth, diameter, raw, 
             half=half,
         )
         tell(log.problem, raw, section, depth_key, expected)
+
+
+def depth_of_head(given, depth, diameter):
+    """Depth of the head of an upright tank, m: as given, or by its radii; None: not known."""
+    if depth is not None or given["form"] != "torispherical":
+        return depth
+    end = End("torispherical", 0.0, given["dish_radius_m"], given["knuckle_radius_m"])
+    if given["standard"] is not None:
+        end = standard_end(End("torispherical"), given["standard"], diameter)
+    try:
+        return depth_of(end, diameter / 2)
+    except SolutionError:  # told by the checks of its sizes
+        return None

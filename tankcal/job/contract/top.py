@@ -1,8 +1,14 @@
 """[top]: the keys of a head on an upright tank; its form complete, and of a credible size."""
 
 from tankcal.job.checking import is_not_given, missing_beside, tell
-from tankcal.job.contract.bottom import DEEPEST, SHAPED, depth_of_head
-from tankcal.job.contract.ends import check_radii, depth_missing, too_deep, torispherical_keys
+from tankcal.job.contract.bottom import DEEPEST, SHAPED
+from tankcal.job.contract.ends import (
+    check_radii,
+    depth_missing,
+    depth_of_head,
+    too_deep,
+    torispherical_keys,
+)
 from tankcal.job.contract.kinds import VERTICAL
 from tankcal.job.contract.shorthand import choice, positive
 from tankcal.messages import message
