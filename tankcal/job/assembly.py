@@ -34,6 +34,7 @@ from tankcal.job.model import (
     Switches,
     TableSpec,
     Tank,
+    Top,
 )
 from tankcal.job.strapping import gauged
 from tankcal.job.tables import fingerprint, read_bytes
@@ -175,6 +176,7 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         bottom=_bottom(values, tables["bottom"]),
         deadwood=_deadwood(tables["deadwood"]),
         roof=_roof(values["roof"]),
+        top=_top(values["top"]),
         horizontal=_horizontal(values["horizontal"], has_points) if kind == "horizontal" else None,
         rings=_rings(tables) if kind == "horizontal" else (),
         sphere=_sphere(values["sphere"]) if kind == "sphere" else None,
@@ -339,7 +341,11 @@ def _bottom(values, table):
     if form == "liquid":
         level, volume, u = (_column(table, name) for name in ("level_m", "volume_m3", "u_m3"))
         return Bottom(form, level_m=level, volume_m3=volume, u_m3=u, rows=table.rows)
-    return Bottom(form, values["bottom"]["centre_z_m"])
+    return Bottom(form, **{key: one for key, one in values["bottom"].items() if key != "form"})
+
+
+def _top(values):
+    return None if values["form"] is None else Top(**values)
 
 
 def _column(table, name, per_si=1):
@@ -360,7 +366,7 @@ def _roof(values):
 def _horizontal(values, has_points):
     width, height = (values[name] or values["diameter_m"] for name in ("width_m", "height_m"))
     length, dip, tilt = (values[name] for name in ("length_m", "dip_from_a_m", "tilt_mm_per_m"))
-    azimuth = values["azimuth_deg"]
+    azimuth, angle = values["azimuth_deg"], values["tube_angle_deg"]
     return Horizontal(
         length,
         _end(values, "end_a"),
@@ -373,6 +379,8 @@ def _horizontal(values, has_points):
         dip_direction=values["dip_direction"] or "plumb",
         thickness_m=(values["thickness_mm"] or 0.0) / 1000,
         azimuth_rad=None if azimuth is None else float(np.radians(azimuth)),
+        tube_angle_rad=angle and float(np.radians(angle)),
+        tube_offset_m=values["tube_offset_m"],
     )
 
 
@@ -381,7 +389,7 @@ def _end(values, end):
     if form == "flat":
         return End(form)
     radii = (values[f"{end}_dish_radius_m"], values[f"{end}_knuckle_radius_m"])
-    return End(form, depth or 0.0, *radii)
+    return End(form, depth or 0.0, *radii, values[f"{end}_standard"])
 
 
 def _sphere(values):

@@ -160,6 +160,7 @@ def _of_shell(job, wall):
             f"{ISO_7507}; API MPMS 2.2A",
         ),
         ("bottom", job.bottom.form != "flat", BOTTOM_FORMULAS[job.bottom.form], ISO_7507),
+        ("top", job.top is not None, TOP_FORMULA, ISO_7507),
         ("roof", roof is not None, _roof_formula(roof), f"{ISO_7507}; API MPMS 2.2A"),
     )
 
@@ -193,6 +194,13 @@ BOTTOM_FORMULAS = {
     "dish": message(
         "dish_bottom", "π H (3 r² + H²)/6 for a round shell; computed with the shell's own outline"
     ),
+    "ellipsoidal": message(
+        "ellipsoidal_bottom", "2 π r² H/3 for a round shell; computed with the shell's own outline"
+    ),
+    "torispherical": message(
+        "torispherical_bottom",
+        "dish and knuckle turned about the axis; computed with the shell's own outline",
+    ),
     "points": SURVEYED_BOTTOM,
     "cloud": SURVEYED_BOTTOM,
     "liquid": message(
@@ -200,6 +208,9 @@ BOTTOM_FORMULAS = {
         "measured volumes up to the highest measured level, increments of the shell above it",
     ),
 }
+
+
+TOP_FORMULA = message("head_on_top", "volume of the head over the area of the last course")
 
 
 def _roof_formula(roof):

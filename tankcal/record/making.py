@@ -97,6 +97,9 @@ class Record(Saved, kw_only=True):
     corrections: list[Correction] = key("that bear on the job, in their order", default=())
     solid: list[table.Detail] | None = key("sizes of a tank without courses", default=None)
     bottom: list[table.Detail] | None = key("how it was taken; null: it is flat", default=None)
+    top: list[table.Detail] | None = key(
+        "the head on top; left out where there is none", default=None, optional=True
+    )
     deadwood: list[Deadwood] = key("as declared, whether or not it is on", default=())
     roof: list[table.Detail] | None = key("the floating roof", default=None)
     budget: list[statements.BudgetLine] = key("of the top row, by the table alone", default=())
@@ -141,6 +144,7 @@ def record_of(result):
             corrections=result.corrections,
             solid=table.solid_of(result),
             bottom=table.bottom_of(result),
+            top=table.top_of(result),
             deadwood=job.deadwood,
             roof=table.roof_of(result),
             budget=statements.budget_of(result),

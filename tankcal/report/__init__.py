@@ -11,6 +11,7 @@ FILES = (
 )
 LETTERHEAD = "letterhead.json"  # there when a letterhead was given
 _NOT_IN_ALL = (
+    "top",
     "budgets",
     "deliveries",
     "rule",

@@ -16,9 +16,9 @@ from tankcal.tank.volumes import ShellVolume
 from tankcal.uncertainty import declared_source, group_correlated
 
 OWN_SCALE = "instrument_scale"  # kind of a cause that stands for the input "scale"
-MEASURED = (  # at its warmth
-    *("diameter", "length", "end_depth", "dip_position", "plate_thickness"),
-    *("paint", "ring_lengths", "ring_axes"),
+MEASURED = (  # lengths at the warmth of the survey
+    *("diameter", "length", "end_depth", "dish", "knuckle", "dip_position", "tube_offset"),
+    *("plate_thickness", "paint", "ring_lengths", "ring_axes"),
 )
 ROUNDED_M = 0.001  # that the last dip of a table, a whole millimetre, stands above the top at most
 LEVELS = 9  # from empty to full, at which inputs are asked whether they move the volume
@@ -228,12 +228,13 @@ class SolidPart(Part):
         return np.asarray(levels_m, dtype=float) / self._stretch
 
     def _shares(self, levels_m):
-        return np.asarray(levels_m, dtype=float) / self.top_m
+        share, _ = self.solid.height_share(self._of_solid(levels_m))
+        return share
 
     def _formed_area(self, levels_m, volume, area):
         """Of the wall, from volume and area of the solid at its own levels."""
-        shares = self._shares(levels_m)
-        slope = self.form.factor_slope(shares) / self.top_m
+        shares, by_level = self.solid.height_share(self._of_solid(levels_m))
+        slope = self.form.factor_slope(shares) * by_level / self._stretch
         return area * self.form.factor(shares) / self._stretch + volume * slope
 
     def _formed(self, levels_m, found):
@@ -327,7 +328,7 @@ class Body:
 
     def only_shell(self):
         """The body of the shell of courses alone."""
-        return replace(self, parts=(self.shell,))
+        return replace(self, parts=(self.shell,), highest_m=self.shell.volume.height_m)
 
     def undeclared(self):
         """Names of the inputs that move some volume of the tank and have no declared u.

@@ -12,13 +12,13 @@ from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 from tankcal.tank.lying import levels_inside, require_length
-from tankcal.tank.parts import Part
+from tankcal.tank.parts import Solid
 
 ROUNDS = 60  # of the highest dip of a pressed sphere, which converges as its strain, some 1e-4
 
 
 @dataclass(frozen=True)
-class Ellipsoid(Part):
+class Ellipsoid(Solid):
     """An ellipsoid with a vertical axis: V = pi a b d^2 (3 c - d) / (3 c^2).
 
     Attributes
@@ -141,7 +141,7 @@ class Membrane:
 
 
 @dataclass(frozen=True)
-class PressedSphere(Part):
+class PressedSphere(Solid):
     """A sphere, or nearly one, that its pressure widens, from the survey day to the table's dip.
 
         dr / r = p r (1 - nu) / (2 E t),      p = gas + rho g h^2 / (4 r), less that of the survey
@@ -153,7 +153,7 @@ class PressedSphere(Part):
 
     Attributes
     ----------
-    solid : Part
+    solid : Solid
         Sphere or ellipsoid as surveyed, inside.
     membrane : Membrane
     pressure : Pressure
@@ -166,7 +166,7 @@ class PressedSphere(Part):
     (0.0004248, 0.00127)
     """
 
-    solid: Part
+    solid: Solid
     membrane: Membrane
     pressure: Pressure
 

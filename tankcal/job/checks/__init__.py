@@ -41,6 +41,7 @@ from tankcal.job.contract.points import check_points
 from tankcal.job.contract.roof import check_roof
 from tankcal.job.contract.ship import check_ship
 from tankcal.job.contract.stated import check_stated
+from tankcal.job.contract.top import check_top
 from tankcal.job.contract.uncertainty import check_inputs
 from tankcal.job.contract.welds import check_welds
 from tankcal.job.entries import kind_of
@@ -115,6 +116,7 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
         if points is not None:
             check_cylinder(points, tables, values, raw, log)
         check_bottom(values, tables["bottom"], points, extent, raw, log)
+        check_top(values, is_metered(tables), raw, log)
         check_roof(values["roof"], extent, raw, log)
     elif has_rows(points):
         check_scan(points, values, kind, raw, log)

@@ -13,10 +13,16 @@ from tankcal.job.checks.extent import (
     wall_of,
 )
 from tankcal.job.contract import INPUTS
-from tankcal.job.contract.bottom import bottom_form
+from tankcal.job.contract.bottom import SHAPED, bottom_form
+from tankcal.job.contract.lying import RINGS_WITHOUT_TUBE, ROUND_TUBE
 from tankcal.job.contract.ship import is_ship
 from tankcal.messages import message
 
+GIVEN = ("dish", "knuckle")
+SIZES_OF_END = ("depth_m", "dish_radius_m", "knuckle_radius_m", "standard")
+NO_SUCH_RADIUS = message(
+    "no_such_radius", "expected only with a torispherical end that is given by this radius"
+)
 NOT_SUBTRACTED = message(
     "nothing_subtracted",
     "expected only with side = outside: with side = inside nothing is subtracted",
@@ -94,12 +100,13 @@ def _of_vertical(values, tables):
     )
     return _of_plates(values, tables, head or not no_liquid) | {
         "offset": of_points if _has_own_offset(tables) else "",
-        "course_heights": _of_heights(tables["courses"]),
+        "course_heights": _of_heights(tables["courses"], values),
         "youngs_modulus": NO_HEAD if not head and no_liquid else "",
         "liquid_density": "" if head else NO_HEAD,
         "survey_level": NO_SURVEY_LIQUID if no_liquid else "",
         "survey_density": NO_SURVEY_LIQUID if no_liquid else "",
         "bottom": _of_bottom(values, tables["bottom"]),
+        **_of_heads(values, tables["bottom"]),
         "roof_mass": message("no_floating_roof", "expected only with a floating roof: [roof]")
         if no_roof
         else "",
@@ -141,6 +148,28 @@ def _of_bottom(values, bottom):
     }.get(bottom_form(values, bottom), "")
 
 
+def _of_heads(values, bottom):
+    """Sizes of a shaped bottom and of a head on top, where they are on."""
+    form, top = bottom_form(values, bottom), values["top"]["form"]
+    off = {part: values["corrections"][part] is False for part in ("bottom", "top")}
+    heads = [
+        {**values[part], "form": shape, "depth_m": values[part][key]}
+        for part, shape, key in (("bottom", form, "centre_z_m"), ("top", top, "depth_m"))
+        if shape == "torispherical" and not off[part]
+    ]
+    shaped = form in SHAPED and not off["bottom"]
+    headed = top is not None and not off["top"]
+    return {
+        **_of_radii_of(heads),
+        "bottom_depth": ""
+        if shaped
+        else message("no_shaped_bottom", "expected only with a bottom that is a cone or a head"),
+        "top_depth": ""
+        if headed
+        else message("no_top", "expected only with a head on the shell: [top]"),
+    }
+
+
 def _of_plates(values, tables, is_loaded, of="courses"):
     """Plates count where they are subtracted or loaded, paint where it is subtracted.
 
@@ -166,8 +195,9 @@ def _of_plates(values, tables, is_loaded, of="courses"):
     return why
 
 
-def _of_heights(courses):
-    is_one = courses is not None and len(courses.rows) + courses.skipped == 1
+def _of_heights(courses, values):
+    headed = values["top"]["form"] is not None and values["corrections"]["top"] is not False
+    is_one = not headed and courses is not None and len(courses.rows) + courses.skipped == 1
     return message("only_one_course", "expected only with two courses or more") if is_one else ""
 
 
@@ -186,6 +216,8 @@ def _of_horizontal(values, tables):
             "end_depth": message("ends_are_flat", "expected only with an end that is not flat")
             if all_flat
             else "",
+            **_of_radii_of_ends(given),
+            **dict.fromkeys(("tube_angle", "tube_offset"), _of_tube(given, wall)),
             "tilt": _from_points(has_points) or switched_off,
             "dip_position": ""
             if leans
@@ -225,6 +257,32 @@ def _of_ship(values):
         ("trim", "list", "pipe_x", "pipe_y", "pipe_lean"), "" if is_ship(values) else no_pipe
     )
     return of_pipe | {"contraction": "" if contracts else no_contraction}
+
+
+def _of_radii_of_ends(given):
+    """Radii that the job gives, or a standard."""
+    ends = [{key: given[f"end_{end}_{key}"] for key in SIZES_OF_END} for end in "ab"]
+    return _of_radii_of(ends)
+
+
+def _of_radii_of(heads):
+    return {
+        name: "" if any(_gives(name, one) for one in heads) else NO_SUCH_RADIUS for name in GIVEN
+    }
+
+
+def _gives(name, end):
+    """Is a radius, "dish" or "knuckle", among the sizes that an end or a head is given by?"""
+    by_standard = end["standard"] and (name == "knuckle" or not end["depth_m"])
+    return bool(end[f"{name}_radius_m"] or by_standard)
+
+
+def _of_tube(given, wall):
+    if wall == "straps":
+        return RINGS_WITHOUT_TUBE
+    if None in (given["width_m"], given["height_m"]):
+        return ""
+    return ROUND_TUBE
 
 
 def _of_wall(given, values, has_points):

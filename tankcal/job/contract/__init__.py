@@ -23,6 +23,7 @@ from tankcal.job.contract import (
     stated,
     strapping,
     tangents,
+    top,
     uncertainty,
     welds,
 )
@@ -38,7 +39,7 @@ from tankcal.text.form_words import NOTES
 
 SECTIONS = (
     *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "ship"),
-    *("bottom", "roof"),
+    *("bottom", "top", "roof"),
     *("shell", "strapping", "liquid", "radii", "change"),
     *("corrections", "material", "checks"),
     *("adjustment", "adjustment.camera", "certificate"),
@@ -50,7 +51,7 @@ COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | tangents.COLUMNS |
 COLUMNS |= great_circles.COLUMNS | clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS
 COLUMNS |= rings.COLUMNS | SURVEY_COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS | radii.KEYS
-_KEYS |= {"bottom": bottom.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
+_KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
 
 SURVEYS = ADJUSTED_SURVEYS | {

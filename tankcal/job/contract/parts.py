@@ -37,6 +37,7 @@ CORRECTIONS = (
     _switch("head", "load the shell with the liquid head, a sphere with its pressure, too", LOADED),
     _switch("tilt", "take the tilt into account", ("vertical", "horizontal")),
     _switch("bottom", "take the form of the bottom into account", VERTICAL),
+    _switch("top", "take the head on top into account", VERTICAL),
     _switch("deadwood", "take the deadwood into account"),
     _switch("roof", "take the floating roof into account", VERTICAL),
 )

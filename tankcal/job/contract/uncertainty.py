@@ -1,7 +1,7 @@
 """uncertainty.csv: what it may declare, what is assumed without it, its columns and its checks."""
 
 from dataclasses import dataclass
-from math import degrees
+from math import degrees, pi
 
 from tankcal.gum.distributions import FAMILIES, expanded, within
 from tankcal.job.checking import refuse_repeated
@@ -124,6 +124,24 @@ INPUTS = {
     ),
     "length": _of_lying("mm", 1e3, 500, "length of the horizontal cylinder"),
     "end_depth": _of_lying("mm", 1e3, 500, "depth of both ends, the same error"),
+    "dish": Declarable(
+        "mm",
+        1e3,
+        500,
+        "radius of the dish of torispherical ends and heads, where it is given, the same error",
+        ("vertical", "horizontal"),
+    ),
+    "knuckle": Declarable(
+        "mm",
+        1e3,
+        200,
+        "radius of the knuckle of torispherical ends and heads, where it is given, the same error",
+        ("vertical", "horizontal"),
+    ),
+    "bottom_depth": _of_shell(
+        "mm", 1e3, 500, "depth of a shaped bottom from its edge to its middle"
+    ),
+    "top_depth": _of_shell("mm", 1e3, 500, "rise of the head on top over the shell"),
     "tilt": Declarable(
         "mm/m",
         1e3,
@@ -142,6 +160,8 @@ INPUTS = {
         "how far the axis of each ring stands above the common one, independent of the others",
         correlates=False,
     ),
+    "tube_angle": _of_lying("deg", 180 / pi, 10, "angle of the gauge tube off the plumb"),
+    "tube_offset": _of_lying("mm", 1e3, 500, "place of the gauge tube across the axis"),
     "surface": Declarable("mm", 1e3, 200, "offset of the mesh's surface from the wall", ("mesh",)),
     "trim": _of_ship("mm", 1e3, 1000, "trim of a ship: draught aft less draught forward"),
     "list": _of_ship("deg", degrees(1), 5, "list of a ship"),

@@ -15,6 +15,7 @@ from tankcal.job.model.parts import (
     Roof,
     Ship,
     Sphere,
+    Top,
 )
 from tankcal.job.model.radii import Change, Radii
 from tankcal.job.model.settings import (
@@ -62,6 +63,7 @@ __all__ = [
     "Switches",
     "TableSpec",
     "Tank",
+    "Top",
 ]
 
 
@@ -94,6 +96,8 @@ class Job:
         In the order of the file.
     roof : Roof or None
         None without a floating roof.
+    top : Top or None
+        Head on a vertical tank; None: its table ends with the shell.
     horizontal, sphere, mesh
         None for the other kinds of tank.
     ship : Ship or None
@@ -174,3 +178,4 @@ class Job:
     change: Change | None = None
     rings: tuple[Ring, ...] = ()
     great_circles: GreatCircles | None = None
+    top: Top | None = None

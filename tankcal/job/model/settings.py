@@ -184,7 +184,7 @@ class Switches:
 
     Attributes
     ----------
-    plate, paint, temperature, head, tilt, bottom, deadwood, roof : bool
+    plate, paint, temperature, head, tilt, bottom, deadwood, roof, top : bool
         False: that correction is not made.
     """
 
@@ -196,6 +196,9 @@ class Switches:
     bottom: bool = True
     deadwood: bool = True
     roof: bool = True
+    top: bool = field(
+        default=True, metadata={"doc": "take the head on top into account", "optional": True}
+    )
 
 
 @dataclass(frozen=True)

@@ -70,6 +70,7 @@ SECTION_NOTES = {
     "mesh": "the closed surface of the inside",
     "ship": "only of a tank of a ship: trims, lists and the sounding pipe; all of it, or nothing",
     "bottom": "what the bottom is like; see bottom.csv, too",
+    "top": "the head on top, which liquid may rise into; blank: the table ends with the shell",
     "roof": "the floating roof: all of it, or nothing when there is none",
     "corrections": "false switches a correction off, and the report says so",
     "material": "the shell's steel",

@@ -101,13 +101,17 @@ def solid_zero(job):
 
 
 def solid_as_surveyed(job, names, values):
-    """The lying tank or sphere inside the plates, of sizes that points gave, at their warmth."""
+    """The lying tank or sphere inside the plates, of sizes that points gave, at their warmth.
+
+    Its dips are plumb ones through the axis, whatever tube the table is for.
+    """
     sized = _with_sizes(job, names, values)
     given = sized.horizontal or sized.sphere
     plate = given.thickness_m if job.survey.side == "outside" and job.switches.plate else 0.0
     if sized.sphere is not None:
         return Sphere(sized.sphere.diameter_m - 2 * plate)
-    return _lying(sized.horizontal, plate, 1.0)
+    by_depth = replace(sized.horizontal, tube_angle_rad=None, tube_offset_m=None)
+    return _lying(by_depth, plate, 1.0)
 
 
 def sized_job(job, scan):
@@ -196,10 +200,12 @@ def _lying(tank, plate_m, scale):
         width_m=scale * (tank.width_m - 2 * plate_m),
         height_m=scale * (tank.height_m - 2 * plate_m),
         length_m=scale * tank.length_m,
-        end_a=inside_end(tank.end_a, plate_m, scale),
-        end_b=inside_end(tank.end_b, plate_m, scale),
+        end_a=inside_end(tank.end_a, tank.width_m, plate_m, scale),
+        end_b=inside_end(tank.end_b, tank.width_m, plate_m, scale),
         tilt=tank.tilt,
         roll_rad=tank.roll_rad,
         dip_from_a_m=scale * tank.dip_from_a_m,
         dip_direction=tank.dip_direction,
+        tube_angle_rad=tank.tube_angle_rad or 0.0,
+        tube_offset_m=scale * (tank.tube_offset_m or 0.0),
     )
