@@ -140,6 +140,11 @@ SLIPS = {
         "size_beside_rings",
         ("job.toml", "horizontal.diameter_m"),
     ),
+    "a tube off the axis": (
+        lambda p: p.settings.update({"horizontal.tube_offset_m": 0.1}),
+        "tube_beside_rings",
+        ("job.toml", "horizontal.tube_offset_m"),
+    ),
     "a dip that leaves the top": (
         lambda p: p.settings.update({"horizontal.dip_from_a_m": 8.99}),
         "dip_leaves_top",
