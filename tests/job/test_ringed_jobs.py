@@ -248,6 +248,6 @@ def test_spoilt_jobs_give_a_result_or_lines(tmp_path):
         try:
             tankcal.run(tankcal.load(folder), simulated=False)
         except TankcalError as error:
-            told += error.args
+            told += getattr(error, "problems", error.args)
     assert told
     assert [one for one in told if "\n" in str(one)] == []

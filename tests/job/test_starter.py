@@ -21,6 +21,7 @@ from tankcal.job.contract import (
     REGISTERS_OF_SURVEY,
     SURVEYS,
     TABLES_OF_KIND,
+    columns_of,
 )
 from tankcal.job.fields import Field
 from tankcal.job.rule_files import LIMITS, RULE, parse_rule, shipped_names
@@ -123,8 +124,9 @@ def test_a_starter_for_a_survey(tmp_path, survey):
         assert list(tomllib.loads(text)[register]["NAME"]) == fields
     for table in SURVEYS[survey]:
         text = (starter / f"{table}.csv").read_text(encoding="utf-8")
-        assert text.splitlines()[-1].split(",") == [field.name for field in COLUMNS[table]]
-        assert all(f"# {field.name}: {field.note}" in text for field in COLUMNS[table])
+        fields = columns_of(table, "vertical")
+        assert text.splitlines()[-1].split(",") == [field.name for field in fields]
+        assert all(f"# {field.name}: {field.note}" in text for field in fields)
     book = openpyxl.load_workbook(starter / "job.xlsx")
     assert book.sheetnames == ["read me", "job", *registers, *tables, "# inputs"]
 
