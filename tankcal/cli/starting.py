@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from tankcal.cli.showing import say, speak
+from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
@@ -45,6 +46,21 @@ def add(commands):
     new.set_defaults(command=_new)
 
 
+def _refuse_other_survey(kind, survey, language):
+    from tankcal.job.starter.form import Form
+
+    try:
+        Form(kind, survey, language)
+    except ValueError as error:
+        expected = message(
+            "survey_of_other_kind",
+            "found {survey}; expected another one: a tank of kind {of_kind} has no such survey",
+            survey=survey,
+            of_kind=kind,
+        )
+        raise InputError(Problem("--survey", expected)) from error
+
+
 def _new(options):
     from tankcal.job.starter import write_input_workbook, write_starter
     from tankcal.report.field_forms import FILE, is_filled_by_pen, write_field_sheets
@@ -53,6 +69,7 @@ def _new(options):
         speak(options.language)
     directory = Path(options.directory)
     form = (options.kind, options.survey, options.language)
+    _refuse_other_survey(*form)
     if options.workbook:
         path = write_input_workbook(directory, *form)
         say(message("wrote_workbook", "wrote {file}: fill it in, save it, then", file=str(path)))

@@ -35,6 +35,7 @@ from tankcal.job.model import (
     Switches,
     TableSpec,
     Tank,
+    Top,
 )
 from tankcal.job.strapping import gauged
 from tankcal.job.tables import fingerprint, read_bytes
@@ -176,6 +177,7 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         bottom=_bottom(values, tables["bottom"]),
         deadwood=_deadwood(tables["deadwood"]),
         roof=_roof(values["roof"]),
+        top=_top(values["top"]),
         horizontal=_horizontal(values["horizontal"], has_points) if kind == "horizontal" else None,
         rings=_rings(tables) if kind == "horizontal" else (),
         sphere=_sphere(values["sphere"]) if kind == "sphere" else None,
@@ -233,7 +235,14 @@ def _tank(values):
 def _survey(values):
     if values["date"] is None:
         return None
-    return Survey(**{**values, "side": values["side"] or "inside"})
+    given = {name: value for name, value in values.items() if name != "pressure_bar"}
+    pressure = _pascals(values["pressure_bar"])
+    return Survey(**{**given, "side": values["side"] or "inside"}, pressure_pa=pressure)
+
+
+def _pascals(bar):
+    """None of nothing, and of 0."""
+    return 1e5 * bar if bar else None
 
 
 def _datum(values, kind, has_points):
@@ -248,10 +257,12 @@ def _table(values):
         return None
     given = _given(values)
     litres = given.pop("max_interpolation_error_l", None)
+    pressure = _pascals(given.pop("pressure_bar", None))
     return TableSpec(
         step_m=given.pop("step_m", None),
         fine_zones=tuple(sorted(given.pop("fine_zones", ()))),
         max_interpolation_error_m3=None if litres is None else litres / 1000,
+        pressure_pa=pressure,
         **given,
     )
 
@@ -261,6 +272,8 @@ def _material(values):
     si = {"e_pa": 1e9 * given["e_gpa"]} if "e_gpa" in given else {}
     if "expansion_per_k" in given:
         si["expansion_per_k"] = given["expansion_per_k"]
+    if "poisson" in given:
+        si["poisson"] = given["poisson"]
     return Material(**si, expansion_given="expansion_per_k" in given)
 
 
@@ -338,7 +351,11 @@ def _bottom(values, table):
     if form == "liquid":
         level, volume, u = (_column(table, name) for name in ("level_m", "volume_m3", "u_m3"))
         return Bottom(form, level_m=level, volume_m3=volume, u_m3=u, rows=table.rows)
-    return Bottom(form, values["bottom"]["centre_z_m"])
+    return Bottom(form, **{key: one for key, one in values["bottom"].items() if key != "form"})
+
+
+def _top(values):
+    return None if values["form"] is None else Top(**values)
 
 
 def _column(table, name, per_si=1):
@@ -359,7 +376,7 @@ def _roof(values):
 def _horizontal(values, has_points):
     width, height = (values[name] or values["diameter_m"] for name in ("width_m", "height_m"))
     length, dip, tilt = (values[name] for name in ("length_m", "dip_from_a_m", "tilt_mm_per_m"))
-    azimuth = values["azimuth_deg"]
+    azimuth, angle = values["azimuth_deg"], values["tube_angle_deg"]
     return Horizontal(
         length,
         _end(values, "end_a"),
@@ -372,6 +389,8 @@ def _horizontal(values, has_points):
         dip_direction=values["dip_direction"] or "plumb",
         thickness_m=(values["thickness_mm"] or 0.0) / 1000,
         azimuth_rad=None if azimuth is None else float(np.radians(azimuth)),
+        tube_angle_rad=angle and float(np.radians(angle)),
+        tube_offset_m=values["tube_offset_m"],
     )
 
 
@@ -380,11 +399,16 @@ def _end(values, end):
     if form == "flat":
         return End(form)
     radii = (values[f"{end}_dish_radius_m"], values[f"{end}_knuckle_radius_m"])
-    return End(form, depth or 0.0, *radii)
+    return End(form, depth or 0.0, *radii, values[f"{end}_standard"])
 
 
 def _sphere(values):
-    return Sphere(values["diameter_m"], (values["thickness_mm"] or 0.0) / 1000)
+    lengths = (values[name] for name in ("ovality_mm", "form_mm"))
+    return Sphere(
+        values["diameter_m"],
+        (values["thickness_mm"] or 0.0) / 1000,
+        *(None if one is None else one / 1000 for one in lengths),
+    )
 
 
 def _ship(values):

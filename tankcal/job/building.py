@@ -10,10 +10,12 @@ from tankcal.job.checks.extent import has_radii, has_survey, is_metered, is_sigh
 from tankcal.job.clouds import make_clouds
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.contract.clouds import KINDS as OF_CLOUDS
+from tankcal.job.contract.great_circles import BESIDE as BESIDE_CIRCLES
 from tankcal.job.contract.strapping import COLUMNS as OF_TAPES
 from tankcal.job.contract.strapping import IN_PLACE
 from tankcal.job.covariance import OF_RADII, read_covariance
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
+from tankcal.job.great_circles import make_great_circles
 from tankcal.job.hits import make_hits
 from tankcal.job.lines import make_lines
 from tankcal.job.liquid import make_metering
@@ -30,6 +32,7 @@ from tankcal.job.tables import (
     RADII_TABLES,
     REGISTERS,
     RING_TABLES,
+    SPHERE_TABLES,
     STRAPPING_TABLES,
     SURVEY_TABLES,
     TABLES,
@@ -74,6 +77,7 @@ def job_of(raw, log, is_whole=True):
         liquid=liquid,
         radii=radii,
         change=change,
+        great_circles=make_great_circles(tables, registers),
     )
 
 
@@ -90,6 +94,8 @@ def _read_tables(raw, registers, is_whole, log):
         allowed += STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + RADII_TABLES
     if kind == "horizontal":
         allowed += (*RING_TABLES, *OF_TAPES)
+    if kind == "sphere":
+        allowed += SPHERE_TABLES + BESIDE_CIRCLES
     if kind in OF_CLOUDS:
         allowed += CLOUD_TABLES
     tables = {"clouds": _cloud_table(raw, registers, kind, log)}

@@ -103,6 +103,14 @@ def loads_the_shell(values):
     return bool(asked) and values["corrections"]["head"] is not False
 
 
+def loads_sphere(values):
+    """Does anything widen a sphere: pressure or liquid, of the table or of the survey day?"""
+    table, survey = values["table"], values["survey"]
+    liquid = (survey["liquid_density_kg_m3"] or 0) * (survey["liquid_level_m"] or 0)
+    loads = (table["pressure_bar"], survey["pressure_bar"], liquid, loads_the_shell(values))
+    return any(loads) and values["corrections"]["head"] is not False
+
+
 def zero_z(values):
     """z of the table's zero in the frame of the points, m, or None: not known."""
     plate = values["datum"]["dip_plate_z_m"]

@@ -75,7 +75,10 @@ END_DEPTH = {  # over the diameter
     "conical": (0.02, 0.3),
     "ellipsoidal": (0.12, 0.4),
     "spherical": (0.05, 0.22),
+    "torispherical": (0.12, 0.3),
+    "guppy": (0.05, 0.6),
 }
+STRONG_ROLL_DEG = 15.0  # of a gauge tube off the plumb
 HEMISPHERE = 0.47
 DISH_RADIUS, KNUCKLE_RADIUS = (0.7, 1.3), (0.03, 0.25)  # over the diameter
 ENDS_DIFFER, ENDS_DIFFER_M = 1.2, 0.03
@@ -230,7 +233,8 @@ def _thinnest(shell):
 
 def _of_ends(form):
     low, high = END_DEPTH[form]
-    return f"{form} {low:g} to {high:g}"
+    hemisphere = f" or {HEMISPHERE:g} to 0.5" if form == "spherical" else ""
+    return f"{form} {low:g} to {high:g}{hemisphere}"
 
 
 TABLE = (
@@ -397,10 +401,10 @@ TABLE = (
         ("length_strange", "length_impossible"),
     ),
     Plausible(
-        "horizontal.end_a_depth_m, horizontal.end_b_depth_m",
+        "horizontal.end_a_depth_m, horizontal.end_b_depth_m, top.depth_m",
         "over the diameter: "
         + ", ".join(_of_ends(form) for form in END_DEPTH)
-        + f" or {HEMISPHERE:g} to 0.5; two ends of one form differ by less than"
+        + "; two ends of one form differ by less than"
         f" {100 * (ENDS_DIFFER - 1):.0f} % or {1000 * ENDS_DIFFER_M:g} mm",
         "twice as deep, the dish's radius for its depth",
         "the diameter, the other end",
@@ -420,6 +424,13 @@ TABLE = (
         "degrees or percent",
         "",
         ("large_tilt",),
+    ),
+    Plausible(
+        "horizontal.tube_angle_deg",
+        f"up to {STRONG_ROLL_DEG:g} degrees",
+        "the angle against the horizontal",
+        "",
+        ("large_roll",),
     ),
     Plausible(
         "sphere.diameter_m",

@@ -16,14 +16,24 @@ def make_strapping(values, tables, registers):
     tapes, keys = tapes_of(registers), values["strapping"]
     return Strapping(
         straps=_straps(table, tapes),
-        tapes=tuple(_tape(name, given) for name, given in tapes.items()),
-        obstructions=_obstructions(tables["obstructions"]),
-        comparisons=_comparisons(tables["tape_checks"]),
+        **tools_of(tables, tapes),
         shape_sd_m=_metres(values["shell"]["shape_sd_mm"]),
         wave_m=_metres(keys["wave_mm"]),
         helix_m=_metres(keys["helix_mm"]),
         plate_sd_m={name: one[1] for name, one in gauged(tables["thickness"]).items()},
     )
+
+
+def tools_of(tables, tapes):
+    """Tapes, obstructions and comparisons, as arguments of `Strapping`.
+
+    tapes  {name: {key: value}}
+    """
+    return {
+        "tapes": tuple(_tape(name, given) for name, given in tapes.items()),
+        "obstructions": _obstructions(tables["obstructions"]),
+        "comparisons": _comparisons(tables["tape_checks"]),
+    }
 
 
 def gauged(table):

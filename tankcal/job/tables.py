@@ -27,6 +27,7 @@ STRAPPING_TABLES = (
     *("circumferences", "obstructions", "thickness", "tape_checks"),
     *("lines", "offsets"),
 )
+SPHERE_TABLES = ("great_circles",)
 HITS_TABLES = ("wall_hits", "control_readings")
 TANGENT_TABLES = ("tangents",)
 CLOUD_TABLES = ("scan_targets",)
@@ -34,7 +35,7 @@ LIQUID_TABLES = ("liquid",)
 RADII_TABLES = ("radii",)
 RING_TABLES = ("rings",)
 TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + CLOUD_TABLES
-TABLES += LIQUID_TABLES + RADII_TABLES + RING_TABLES + SURVEY_TABLES
+TABLES += LIQUID_TABLES + RADII_TABLES + RING_TABLES + SPHERE_TABLES + SURVEY_TABLES
 REGISTERS = {  # what each lists
     "cameras": "camera",
     "instruments": "instrument",

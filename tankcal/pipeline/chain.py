@@ -40,6 +40,7 @@ from tankcal.pipeline.statements import (
     statements,
     verdict_of,
 )
+from tankcal.pipeline.strapped_sphere import StrappedSphere
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.survey_warnings import incomplete_certificate, open_questions
 from tankcal.pipeline.surveying import find_survey, placed
@@ -58,7 +59,7 @@ from tankcal.tank.capacity import Capacity, Quantity
 from tankcal.tank.dips import Dips, ProportionalParts, Straightness, proportional_parts
 from tankcal.tank.falling_capacity import refuse_falling
 from tankcal.tank.rules import RuleVerdict
-from tankcal.tank.service import shell_factor, shell_temperature_c
+from tankcal.tank.service import shell_factor, shell_temperature_c, solid_factor
 from tankcal.tank.volumes import ShellVolume
 from tankcal.text.digits import decimals_of_height, fixed
 from tankcal.text.display import table_html, volume_text
@@ -102,6 +103,8 @@ class Result:
         The rings of a lying cylinder that a tape was put round.
     ship : ship.ShipTables or None
         Corrections of soundings for trim and list, of a tank of a ship.
+    circles : strapped_sphere.StrappedSphere or None
+        The sphere that a tape was put round.
     body : body.Body
         The tank as the sum of its parts, with all corrections that are on.
     zero_m : float
@@ -162,6 +165,7 @@ class Result:
     radii: RadiiWall | None = None
     rings: RingedWall | None = None
     ship: ShipTables | None = None
+    circles: StrappedSphere | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -273,13 +277,19 @@ class Result:
         *,
         insulated: bool = False,
     ) -> float:
-        """Volume at a dip of a shell that the liquid keeps at another temperature: V times CTSh.
+        """Volume at a dip of a shell that the liquid keeps at another temperature: V times CTSh,
+        of a tank that is one solid as it grows all over (`service.solid_factor`).
 
         ambient_c  needed for a shell that is not insulated (`service.shell_temperature_c`)
         """
         shell_c = shell_temperature_c(liquid_c, ambient_c, insulated=insulated)
         reference, expansion = self.job.table.reference_temperature_c, self.job.material
-        factor = shell_factor(shell_c, reference, expansion.expansion_per_k)
+        expands = expansion.expansion_per_k
+        if self.job.tank.kind == "vertical":
+            factor = shell_factor(shell_c, reference, expands)
+        else:
+            levels = np.array([height_m + self.zero_m])
+            factor = float(solid_factor(self.body, levels, shell_c, reference, expands)[0])
         return self.at(height_m).value_m3 * factor
 
     def dip_of(self, volume_m3: float | np.ndarray) -> Dips:
@@ -423,6 +433,7 @@ def _run(job, progress, part_progress, simulated, reading):
         radii=radii,
         rings=survey if isinstance(survey, RingedWall) else None,
         ship=ship,
+        circles=survey if isinstance(survey, StrappedSphere) else None,
     )
 
 

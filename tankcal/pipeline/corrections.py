@@ -6,12 +6,13 @@ import numpy as np
 
 from tankcal.job import Switches
 from tankcal.messages import Message, message
-from tankcal.pipeline.tanks import as_declared, body_of, thermal_scale
+from tankcal.pipeline.tanks import as_declared, body_of, pressure_of, thermal_scale
 from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 
 # Named by title and edition alone: the bodies of paid standards were not read, so no clause is.
 ISO_7507 = "ISO 7507-1:2003"
 ISO_4269 = "ISO 4269:2001"
+TIMOSHENKO = "Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells"
 INSIDE_PLATE = message("inside_plate", "r_inside = r − t")
 INSIDE_PAINT = message("inside_paint", "r_inside = r − t − paint")
 NONE = Switches(**{field.name: field.name == "tilt" for field in fields(Switches)})
@@ -93,6 +94,8 @@ def _tilt(job, wall, volume, formula, source):
 def _known(job, survey):
     """(code, whether it bears on the job, formula, source) of each correction, in their order."""
     of_shell = _of_shell(job, survey) if job.tank.kind == "vertical" else ()
+    if job.tank.kind == "sphere":
+        of_shell = (_of_pressure(job),)
     declared = message("sum_of_volumes", "sum of the declared volumes")
     deadwood = ("deadwood", bool(job.deadwood), declared, ISO_7507)
     return [*_of_lengths(job), *of_shell, deadwood]
@@ -157,8 +160,25 @@ def _of_shell(job, wall):
             f"{ISO_7507}; API MPMS 2.2A",
         ),
         ("bottom", job.bottom.form != "flat", BOTTOM_FORMULAS[job.bottom.form], ISO_7507),
+        ("top", job.top is not None, TOP_FORMULA, ISO_7507),
         ("roof", roof is not None, _roof_formula(roof), f"{ISO_7507}; API MPMS 2.2A"),
     )
+
+
+def _of_pressure(job):
+    load = pressure_of(job)
+    formula = message(
+        "pressure_of_sphere",
+        "Δr = p r² (1 − ν)/(2 E t), p = p₀ + ρ g h²/(4 r); table {table_bar:g} bar and"
+        " {table_kg_m3:g} kg/m³, survey {survey_bar:g} bar and {survey_kg_m3:g} kg/m³ to"
+        " {level_m:g} m",
+        table_bar=load.gas_pa / 1e5,
+        table_kg_m3=load.density_kg_m3,
+        survey_bar=load.survey_gas_pa / 1e5,
+        survey_kg_m3=load.survey_density_kg_m3,
+        level_m=load.survey_level_m,
+    )
+    return ("head", load.is_there, formula, TIMOSHENKO)
 
 
 SURVEYED_BOTTOM = message(
@@ -174,6 +194,13 @@ BOTTOM_FORMULAS = {
     "dish": message(
         "dish_bottom", "π H (3 r² + H²)/6 for a round shell; computed with the shell's own outline"
     ),
+    "ellipsoidal": message(
+        "ellipsoidal_bottom", "2 π r² H/3 for a round shell; computed with the shell's own outline"
+    ),
+    "torispherical": message(
+        "torispherical_bottom",
+        "dish and knuckle turned about the axis; computed with the shell's own outline",
+    ),
     "points": SURVEYED_BOTTOM,
     "cloud": SURVEYED_BOTTOM,
     "liquid": message(
@@ -181,6 +208,9 @@ BOTTOM_FORMULAS = {
         "measured volumes up to the highest measured level, increments of the shell above it",
     ),
 }
+
+
+TOP_FORMULA = message("head_on_top", "volume of the head over the area of the last course")
 
 
 def _roof_formula(roof):

@@ -12,7 +12,7 @@ import numpy as np
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.simulation.curvature import vary_input
 from tankcal.pipeline.tanks import body_of, zero_height
-from tankcal.tank.service import shell_factor
+from tankcal.tank.service import shell_factor, solid_factor
 from tankcal.uncertainty import triangular
 
 MOVED = ("diameter", "length", "end_depth", "tilt", "dip_position")  # of one solid; and its zero
@@ -170,19 +170,12 @@ def _mean_radius(body):
 
 
 def _growth(job, body, levels_m, shell_c):
-    """Factor of volumes by the shell's temperature at a fixed level.
-
-    An upright shell widens, (1 + a dT)^2; a solid grows all over, (1 + a dT)^3 V(h / (1 + a dT)).
-    """
+    """Factor of volumes by the shell's temperature at a fixed level."""
     base, expansion = job.table.reference_temperature_c, job.material.expansion_per_k
     warm = np.where(np.isfinite(shell_c), shell_c, base)
     if job.tank.kind == "vertical":
         return shell_factor(warm, base, expansion)
-    grown = 1 + expansion * (warm - base)
-    shrunk = np.clip(levels_m / grown, body.lowest_m, body.highest_m)
-    before = body.volume_m3(levels_m)
-    ratio = grown**3 * body.volume_m3(shrunk) / np.where(before > 0, before, 1.0)
-    return np.where(before > 0, ratio, 1.0)
+    return solid_factor(body, levels_m, warm, base, expansion)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from tankcal.geometry.field.places import (
     CylinderFunctionals,
     OnCylinder,
     OnSphere,
-    cap_integrals,
+    cap_volumes,
     cells_along,
     cells_around,
     means_of_neighbours,
@@ -39,7 +39,7 @@ from tankcal.tank.factors import Factor, survey_factors
 from tankcal.tank.surveyed_form import NODES, SurveyedForm, node_levels
 from tankcal.uncertainty import factor_of
 
-KINDS = ("bulge", "ovality", "seams")
+KINDS = ("bulge", "ovality", "oblateness", "seams")
 MOST_ROUNDS = 10
 NEIGHBOURS = 12
 DENT_M = 0.02  # depth of a dent that one point alone may show
@@ -223,8 +223,7 @@ def _on_cylinder(job, fit, xyz_m):
 def _functionals(job, fitted, solid, places, levels_m, area_m2, chosen):
     """Of the volumes at the nodes, the sizes, and the wall at the top and at the bottom."""
     if not isinstance(fitted.fit, FittedCylinder):
-        cosine = 1 - levels_m / (solid.diameter_m / 2)
-        volumes = (solid.diameter_m / 2) ** 2 * cap_integrals(cosine) - area_m2[:, None]
+        volumes = cap_volumes(levels_m, area_m2, solid.diameter_m / 2)
         ends = np.array([(-1.0) ** DEGREES, np.ones(len(DEGREES))])
         return np.vstack([volumes, np.zeros((len(fitted.names), len(DEGREES))), ends])
     along = _on_cylinder(job, fitted.fit, job.points.xyz_m[chosen])[1]

@@ -21,6 +21,7 @@ from tankcal.pipeline.radii_wall import RadiiWall, find_radii_wall
 from tankcal.pipeline.ringed_wall import find_ringed_wall
 from tankcal.pipeline.scan import Scan, fit_scan
 from tankcal.pipeline.ship import check_pipe
+from tankcal.pipeline.strapped_sphere import find_strapped_sphere
 from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.survey_warnings import refuse_undetermined
 from tankcal.pipeline.tangent_wall import find_tangent_wall
@@ -149,6 +150,8 @@ def _survey(job, progress, dof, amplitudes):
         return find_nominal_wall(job, progress)
     if job.tank.kind == "vertical":
         return find_wall(job, progress, dof, amplitudes)
+    if job.great_circles is not None:
+        return find_strapped_sphere(job, progress)
     if job.mesh is not None:
         progress(message("checking_mesh", "checking the mesh {file}", file=job.mesh.file))
         mesh = parse_mesh(job.mesh.file, job.mesh.data, job.mesh.unit_m)

@@ -12,6 +12,7 @@ from tankcal.messages import message
 from tankcal.pipeline.cloud_checks import check_clouds
 from tankcal.pipeline.cloud_wall import Clouded
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
+from tankcal.pipeline.great_circle_checks import check_circles
 from tankcal.pipeline.hit_checks import check_hits
 from tankcal.pipeline.line_checks import check_leans, check_lines
 from tankcal.pipeline.radii_wall import RadiiWall
@@ -19,6 +20,7 @@ from tankcal.pipeline.ring_checks import check_rings
 from tankcal.pipeline.ringed_wall import RingedWall
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.ship import undeclared_of_ship
+from tankcal.pipeline.strapped_sphere import StrappedSphere
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.strapping_checks import check_strapped, check_straps_beside_points
 from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
@@ -188,6 +190,8 @@ def _doubts_of_survey(job, survey, top_m):
         )
     if isinstance(survey, StrappedWall):
         return (*check_strapped(job, survey), *check_lines(job, survey))
+    if isinstance(survey, StrappedSphere):
+        return check_circles(job, survey)
     if isinstance(survey, Scan):
         return check_scan(job, survey, top_m)
     if isinstance(survey, RingedWall):

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.recalibration.former import FormerTable
-from tankcal.tank.heads import End
+from tankcal.tank.heads import End, standard_end
 from tankcal.tank.solids import LyingTank, Sphere
 
 FEWEST_ROWS = 8
@@ -30,15 +30,14 @@ _BOUND = 1e-4  # of D: an end that comes so near to a limit of its form is at it
 _STEEP = 1e-6  # relative: below, an unknown is not determined
 
 
-def _tied(kind, depth=None, dish=None, knuckle=None):
-    """End of fixed proportions: parts of the diameter."""
+def _tied(kind, depth):
+    """End of fixed proportions: its depth a part of the diameter."""
+    return lambda diameter, _: End(kind, depth * diameter)
 
-    def end(diameter, _):
-        if kind == "torispherical":
-            return End(kind, 0.0, dish * diameter, knuckle * diameter)
-        return End(kind, depth * diameter)
 
-    return end
+def _standard(name):
+    """Torispherical end of a standard form."""
+    return lambda diameter, _: standard_end(End("torispherical"), name, diameter)
 
 
 def _free(kind):
@@ -51,9 +50,9 @@ ENDS = {
     "flat": (lambda *_: End("flat"), False, 0.0),
     "hemispherical": (_tied("spherical", 0.5), False, 0.5),
     "ellipsoidal_2_to_1": (_tied("ellipsoidal", 0.25), False, 0.25),
-    "torispherical_din_28011": (_tied("torispherical", dish=1.0, knuckle=0.1), False, 0.19),
-    "torispherical_din_28013": (_tied("torispherical", dish=0.8, knuckle=0.154), False, 0.25),
-    "torispherical_asme": (_tied("torispherical", dish=1.0, knuckle=0.06), False, 0.17),
+    "torispherical_din_28011": (_standard("din_28011"), False, 0.19),
+    "torispherical_din_28013": (_standard("din_28013"), False, 0.25),
+    "torispherical_asme": (_standard("asme"), False, 0.17),
     "spherical": (_free("spherical"), True, 0.15),
     "ellipsoidal": (_free("ellipsoidal"), True, 0.2),
     "conical": (_free("conical"), True, 0.15),

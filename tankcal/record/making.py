@@ -21,6 +21,7 @@ from tankcal.pipeline.corrections import Correction
 from tankcal.record import statements, survey, table, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.clouds import CloudsRecord, clouds_of
+from tankcal.record.great_circles import GreatCirclesRecord, great_circles_of
 from tankcal.record.hits import HitsRecord, hits_of
 from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.liquid import LiquidRecord, liquid_of
@@ -98,6 +99,9 @@ class Record(Saved, kw_only=True):
     ship: ShipRecord | None = key(
         "corrections for trim and list; left out where there are none", default=None, optional=True
     )
+    great_circles: GreatCirclesRecord | None = key(
+        "strapped sphere; left out where there is none", default=None, optional=True
+    )
     courses: list[survey.CourseOfShell] = key("from the bottom up", default=())
     wall_shape: WallShapeRecord | None = key(
         "for inspections; left out where no upright wall was surveyed by points",
@@ -112,6 +116,9 @@ class Record(Saved, kw_only=True):
     corrections: list[Correction] = key("that bear on the job, in their order", default=())
     solid: list[table.Detail] | None = key("sizes of a tank without courses", default=None)
     bottom: list[table.Detail] | None = key("how it was taken; null: it is flat", default=None)
+    top: list[table.Detail] | None = key(
+        "the head on top; left out where there is none", default=None, optional=True
+    )
     deadwood: list[Deadwood] = key("as declared, whether or not it is on", default=())
     roof: list[table.Detail] | None = key("the floating roof", default=None)
     budget: list[statements.BudgetLine] = key("of the top row, by the table alone", default=())
@@ -146,6 +153,7 @@ def record_of(result):
             liquid=liquid_of(result),
             radii=radii_of(result),
             ship=ship_of(result),
+            great_circles=great_circles_of(result),
             courses=survey.courses_of(result),
             wall_shape=shape_record(job, result.wall),
             capacity=table.capacity_of(result),
@@ -156,6 +164,7 @@ def record_of(result):
             corrections=result.corrections,
             solid=table.solid_of(result),
             bottom=table.bottom_of(result),
+            top=table.top_of(result),
             deadwood=job.deadwood,
             roof=table.roof_of(result),
             budget=statements.budget_of(result),

@@ -80,7 +80,7 @@ def strapping_of(result):
         return None
     return StrappingRecord(
         readings=_readings(result),
-        tapes=[_tape(*one, given) for one in straps.tapes],
+        tapes=tapes_of(straps.tapes, given),
         courses=_courses(result),
         shape_sd_m=straps.shape_sd_m,
         area_term=straps.area_term.mean,
@@ -115,6 +115,11 @@ def _readings(result):
         )
         for index, one in enumerate(straps.reduced)
     ]
+
+
+def tapes_of(tapes, given):
+    """`TapeUsed` of each (Tape, sd of its scale by a master), of a `Strapping`."""
+    return [_tape(*one, given) for one in tapes]
 
 
 def _tape(tape, sd, given):

@@ -303,7 +303,10 @@ def courses_of(result):
         zip(job.courses, result.body.shell.volume.courses, strict=True)
     ):
         is_last = index == len(job.courses) - 1
-        top_m = result.zero_m + result.table.height_m[-1] if is_last else shape.top_m
+        goes_on = result.body.highest_m > shape.top_m  # into a head on top
+        top_m = shape.top_m
+        if is_last and not goes_on:
+            top_m = result.zero_m + result.table.height_m[-1]
         height = top_m - shape.bottom_m
         volume, u = _partial(result, shape.bottom_m, top_m)
         rows.append(

@@ -10,6 +10,7 @@ from tankcal.record.liquid import geometry_beside
 from tankcal.record.schema import Finite, Saved, filled_from, key
 from tankcal.record.statements import intervals_of
 from tankcal.tank.dips import ProportionalParts, dip_label
+from tankcal.tank.heads import torispherical_radii
 
 LEAST_PART_M3 = 1e-4  # last place of a printed part: an error below it is not told apart
 
@@ -158,6 +159,7 @@ def choices_of(result):
         **({"form": "learned"} if result.scan is not None and job.horizontal is not None else {}),
         "thickness": _thickness_choice(job, result),
         "temperature": _temperature_choice(job),
+        **_sphere_choices(job),
         "height_expansion": "yes" if job.table.height_expansion else "no",
         "head": _head_choice(job),
         "deadwood": _fitting_choice(job.switches.deadwood, job.deadwood),
@@ -215,6 +217,7 @@ def _shell_choices(job, result):
         "between_sections": "field",
         "tilt": _tilt_choice(job, wall.shell),
         "course_heights": "along_axis",
+        **_top_choice(job),
         "roof": _fitting_choice(job.switches.roof, roof, roof),
         "snooping": CRITICAL if job.snooping else "off",
         "form": "learned",
@@ -245,6 +248,7 @@ def _strapped_choices(job):
         "bottom": _bottom_choice(job),
         "survey": "strapping" if job.lines is None else "reference_line",
         "area_term": "none" if job.strapping.shape_sd_m == 0 else 1000 * job.strapping.shape_sd_m,
+        **_top_choice(job),
         "between_sections": "cylinders" if job.lines is None else "revolution",
         "tilt": "not_measured" if job.lines is None else "not_applied",
         "course_heights": "along_axis",
@@ -266,6 +270,16 @@ def _ring_choices(result):
     }
 
 
+def _sphere_choices(job):
+    """How a sphere was taken that great circles describe, and the pressure that it is for."""
+    found = {}
+    if job.great_circles is not None:
+        found["survey"] = "great_circles"
+    if job.sphere is not None and job.switches.head and job.table.pressure_pa:
+        found["pressure"] = job.table.pressure_pa / 1e5
+    return found
+
+
 def _liquid_choices(result):
     """Whose table is printed where liquid was metered, and what stood beside the liquid."""
     if result.liquid is None:
@@ -276,6 +290,7 @@ def _liquid_choices(result):
         roof = job.roof and job.roof.weighing
         found |= {
             "bottom": _bottom_choice(job),
+            **_top_choice(job),
             "tilt": "not_measured",
             "course_heights": "along_axis",
             "roof": _fitting_choice(job.switches.roof, roof, roof),
@@ -291,6 +306,7 @@ def _radii_choices(result):
     roof = job.roof and job.roof.weighing
     return {
         "bottom": _bottom_choice(job),
+        **_top_choice(job),
         "radii": job.radii.source,
         "radii_beside": "none" if result.radii.updated is None else "survey",
         "between_sections": "radii",
@@ -302,6 +318,11 @@ def _radii_choices(result):
 
 def _bottom_choice(job):
     return job.bottom.form if job.switches.bottom else "off"
+
+
+def _top_choice(job):
+    """The head on top; nothing is said of a tank without one."""
+    return {} if job.top is None else {"top": job.top.form if job.switches.top else "off"}
 
 
 def _tilt_choice(job, shell):
@@ -381,14 +402,35 @@ def bottom_of(result):
     if job.tank.kind != "vertical" or bottom.form == "flat" or not job.switches.bottom:
         return None
     depth = None if bottom.centre_z_m is None else job.datum.bottom_z_m - bottom.centre_z_m
+    if bottom.form == "torispherical" and depth is None:
+        depth = -result.body.lowest_m
     surveyed = None if bottom.xyz_m is None else len(bottom.xyz_m)
     levels = None if bottom.level_m is None else len(bottom.level_m)
     return described(
         bottom_form=(bottom.form, None),
         bottom_depth=(depth, "m"),
+        bottom_dish_radius=(bottom.dish_radius_m, "m"),
+        bottom_knuckle_radius=(bottom.knuckle_radius_m, "m"),
+        bottom_standard=(bottom.standard, None),
         bottom_points=(surveyed, ""),
         bottom_levels=(levels, ""),
         bottom_lowest=(result.body.lowest_m - result.zero_m, "m"),
+    )
+
+
+def top_of(result):
+    """The head on an upright tank, and what it holds; None without one."""
+    top = result.job.top
+    if top is None or not result.job.switches.top:
+        return None
+    body = result.body
+    return described(
+        top_form=(top.form, None),
+        top_depth=(body.highest_m - body.shell.volume.height_m, "m"),
+        top_dish_radius=(top.dish_radius_m, "m"),
+        top_knuckle_radius=(top.knuckle_radius_m, "m"),
+        top_standard=(top.standard, None),
+        top_capacity=(_size_of(result, "top"), "m3"),
     )
 
 
@@ -420,6 +462,7 @@ def solid_of(result):
         return described(
             diameter=(result.body.parts[0].solid.diameter_m, "m"),
             **_of_scan(result),
+            **_of_ellipsoid(result),
             full_capacity=(result.body.parts[0].capacity_m3, "m3"),
         )
     if job.mesh is not None:
@@ -431,14 +474,31 @@ def solid_of(result):
     return None
 
 
+def _of_ellipsoid(result):
+    """Semi-axes inside of a strapped sphere, as surveyed; nothing of another."""
+    if result.circles is None:
+        return {}
+    job = result.job
+    plate = job.sphere.thickness_m if job.switches.plate else 0.0
+    inside = result.circles.solid(plate)
+    return {
+        "semi_axis_a": (inside.a_m, "m"),
+        "semi_axis_b": (inside.b_m, "m"),
+        "semi_axis_c": (inside.c_m, "m"),
+    }
+
+
 def _of_lying(result):
     lying, tank = result.job.horizontal, result.body.parts[0].solid
     ends = {}
     for name, end in (("a", tank.end_a), ("b", tank.end_b)):
         ends[f"end_{name}"] = (end.kind, None)
+        dish, knuckle = end.dish_radius_m, end.knuckle_radius_m
+        if end.kind == "torispherical":
+            dish, knuckle = torispherical_radii(tank.height_m / 2, end.depth_m, dish, knuckle)
         ends[f"end_{name}_depth"] = (end.depth_m or None, "m")
-        ends[f"end_{name}_dish_radius"] = (end.dish_radius_m, "m")
-        ends[f"end_{name}_knuckle_radius"] = (end.knuckle_radius_m, "m")
+        ends[f"end_{name}_dish_radius"] = (dish, "m")
+        ends[f"end_{name}_knuckle_radius"] = (knuckle, "m")
     return described(
         section_width=(tank.width_m, "m"),
         section_height=(tank.height_m, "m"),
@@ -448,6 +508,8 @@ def _of_lying(result):
         roll=(degrees(lying.roll_rad), "deg"),
         dip_from_a=(tank.dip_from_a_m, "m"),
         dip_direction=(tank.dip_direction, None),
+        tube_angle=(lying.tube_angle_rad and degrees(lying.tube_angle_rad), "deg"),
+        tube_offset=(lying.tube_offset_m and tank.tube_offset_m, "m"),
         **_of_scan(result),
         full_capacity=(result.body.parts[0].capacity_m3, "m3"),
         **(_unread(tank, result.zero_m) if result.job.rings else {}),

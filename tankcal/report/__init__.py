@@ -11,6 +11,7 @@ FILES = (
 )
 LETTERHEAD = "letterhead.json"  # there when a letterhead was given
 _NOT_IN_ALL = (
+    "top",
     "budgets",
     "deliveries",
     "rule",
@@ -23,6 +24,7 @@ _NOT_IN_ALL = (
     "liquid",
     "radii",
     "ship",
+    "great_circles",
 )
 _PARTS = (
     ("certificate.pdf", "certificate"),

@@ -115,7 +115,8 @@ def instruments_of(record):
         used[one["scanner"]] = one["certificate"]
     for one in (record.get("liquid") or {}).get("meters", ()):
         used[one["meter"]] = one["certificate"]
-    for one in strapping["tapes"] if strapping else ():
+    taped = [one for one in (strapping, record.get("great_circles")) if one]
+    for one in (tape for given in taped for tape in given["tapes"]):
         used[one["tape"]] = one["certificate"]
         if one["master"]:
             used[one["master"]] = one["master_certificate"]

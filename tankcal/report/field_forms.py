@@ -1,7 +1,7 @@
 """Field sheets of a starter job: its tables of readings as a crew fills them in by pen."""
 
-from tankcal.job.contract import columns_of
-from tankcal.job.starter.form import DECLARED, METERED, OF_SHELLS, Form
+from tankcal.job.contract import columns_of, tables_of_survey
+from tankcal.job.starter.form import DECLARED, METERED, OF_SHELLS
 from tankcal.job.starter.texts import parted, texts_in
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
@@ -19,6 +19,7 @@ FORMS = (  # tables of each, read in one go, and the rows that a sheet has room 
     (("wall_hits",), 30),
     (("control_readings",), 24),
     (("circumferences",), 15),
+    (("great_circles",), 15),
     (("obstructions",), 9),
     (("thickness",), 8),
     (("tape_checks",), 4),
@@ -57,8 +58,8 @@ def write_field_sheets(path, survey, language, kind="vertical"):
         "strapping", "reference-line", "wall-hits", "tangents" or "liquid".
     language : str
         One of `languages.LANGUAGES`.
-    kind : str
-        Of tank.
+    kind : str, optional
+        Of the tank.
     """
     from tankcal.report.pdf import pdf
 
@@ -85,8 +86,8 @@ def sheets(survey, language, kind="vertical"):
     if survey == METERED:
         found.append(blocks.paragraph(paper.word("forms.batches")))
         found += [*_meters(paper, texts), *_valves(paper)]
-    tables = set(Form(kind, survey, language).tables)
-    forms = [(names, rows) for names, rows in FORMS if set(names) <= tables]
+    tables = tables_of_survey(kind, survey)
+    forms = [(names, rows) for names, rows in FORMS if set(names) <= set(tables)]
     if any(_is_angle(field) for names, _ in forms for field in _columns(names, kind)):
         found.append(blocks.paragraph(paper.word("forms.angles")))
     for names, rows in forms:

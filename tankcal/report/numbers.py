@@ -48,6 +48,7 @@ UNITS = {
     "degC": Unit("°C"),
     "kg/m3": Unit("kg/m³"),
     "GPa": Unit("GPa", 1e-9),
+    "bar": Unit("bar", 1e-5),
     "1/K": Unit("1/K"),
     "percent": Unit("%"),
     "share": Unit("%", 1e2),

@@ -18,8 +18,11 @@ _SET_AS = (  # pattern of the plain text, LaTeX; a longer pattern before its own
         r"1 + \alpha \, (T_\text{%s} - T_\text{%s}) = %s",
     ),
     (r"Δr = ρ g \(h − z\) r²/\(E t\)", r"\Delta r = \rho \, g \, (h - z) \, r^2 / (E \, t)"),
+    (r"Δr = p r² \(1 − ν\)/\(2 E t\)", r"\Delta r = p \, r^2 \, (1 - \nu) / (2 \, E \, t)"),
+    (r"\bp = p₀ \+ ρ g h²/\(4 r\)", r"p = p_0 + \rho \, g \, h^2 / (4 \, r)"),
     (r"\bg(?= = \d)", "g"),
     (r"√\(1 \+ m²\)", r"\sqrt{1 + m^2}"),
+    (r"2 π r² H/3", r"2 \, \pi \, r^2 H / 3"),
     (r"π r² H/3", r"\pi \, r^2 H / 3"),
     (r"π H \(3 r² \+ H²\)/6", r"\pi H \, (3 r^2 + H^2) / 6"),
     (

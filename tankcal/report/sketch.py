@@ -3,6 +3,7 @@
 Not to scale; every measure in it is a value of the record. Lengths of the page are inches.
 """
 
+import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Rectangle
 
@@ -47,20 +48,24 @@ def _upright(paper):
     tank = record["job"]["tank"]
     shape = tank["nominal_height_m"] / tank["nominal_diameter_m"] * (_RIGHT - _LEFT)
     height = max(_LEAST_HEIGHT, min(_MOST_HEIGHT, shape), _OF_COURSE * len(courses))
-    per_m = height / courses[-1]["top_m"]
+    head_m = _head_m(record)
+    per_m = height / (courses[-1]["top_m"] + head_m)
     rise = per_m * _rise_m(record)
     below = max(-rise, 0.0)
     figure, ax = _page(height, below)
     _ground(ax, open_below=below > 0)
-    top, middle = _BOTTOM + height, (_LEFT + _RIGHT) / 2
+    top, middle = _BOTTOM + height - per_m * head_m, (_LEFT + _RIGHT) / 2
     x = [_LEFT, _LEFT, middle, _RIGHT, _RIGHT]
     ax.plot(x, [top, _BOTTOM, _BOTTOM + rise, _BOTTOM, top], color=INK, linewidth=1.4)
-    _open_top(ax, top)
+    if head_m:
+        _closed_top(ax, top, per_m * head_m, record["top"])
+    else:
+        _open_top(ax, top)
     for course in courses:
         _course(ax, paper, course, per_m)
     _level_of(ax, paper, per_m)
     _critical_zone(ax, paper, per_m)
-    _gauge(ax, paper, _dip_x(record), top, _zero_y(record, per_m), below)
+    _gauge(ax, paper, _dip_x(record), _BOTTOM + height, _zero_y(record, per_m), below)
     _measure(ax, _LEFT - 0.35, _BOTTOM, top, _of(paper, "shell", courses[-1]["top_m"]))
     nominal = _of(paper, "diameter", tank["nominal_diameter_m"])
     _across(ax, nominal, below=below)
@@ -71,6 +76,23 @@ def _rise_m(record):
     """How far the centre of a shaped bottom lies above its edge; the courses begin at the edge."""
     found = {one["code"]: one["value"] for one in record["bottom"] or ()}
     return -found.get("bottom_depth", 0.0)
+
+
+def _head_m(record):
+    """How far a head on top rises over the shell; 0 without one."""
+    return {one["code"]: one["value"] for one in record.get("top") or ()}.get("top_depth", 0.0)
+
+
+def _closed_top(ax, y, rise, details):
+    """The head on top: two straight lines for a cone, an arch for all others."""
+    is_cone = any(one["code"] == "top_form" and one["value"] == "cone" for one in details)
+    share = (
+        np.array([-1.0, 0.0, 1.0]) if is_cone else np.sin(np.linspace(-1.0, 1.0, 41) * np.pi / 2)
+    )
+    over = 1 - np.abs(share) if is_cone else np.sqrt(np.maximum(1 - share**2, 0.0))
+    middle, half = (_LEFT + _RIGHT) / 2, (_RIGHT - _LEFT) / 2
+    ax.plot(middle + half * share, y + rise * over, color=INK, linewidth=1.4)
+    ax.plot([_LEFT, _RIGHT], [y, y], color=PALE, linewidth=0.6)
 
 
 def _dip_x(record):

@@ -16,9 +16,9 @@ from tankcal.tank.volumes import ShellVolume
 from tankcal.uncertainty import declared_source, group_correlated
 
 OWN_SCALE = "instrument_scale"  # kind of a cause that stands for the input "scale"
-MEASURED = (  # at its warmth
-    *("diameter", "length", "end_depth", "dip_position", "plate_thickness"),
-    *("paint", "ring_lengths", "ring_axes"),
+MEASURED = (  # lengths at the warmth of the survey
+    *("diameter", "length", "end_depth", "dish", "knuckle", "dip_position", "tube_offset"),
+    *("plate_thickness", "paint", "ring_lengths", "ring_axes"),
 )
 ROUNDED_M = 0.001  # that the last dip of a table, a whole millimetre, stands above the top at most
 LEVELS = 9  # from empty to full, at which inputs are asked whether they move the volume
@@ -144,8 +144,9 @@ class SolidPart(Part):
     unused : tuple of str
         Names of the solid's inputs that have no meaning in this job.
     read_with : dict
-        {input: (f,) derivative of the surveyed inputs by it}, of inputs that the readings of the
-        survey depend on: the temperature of a tape that has that of the shell.
+        {input: (f,) derivative by it of what the survey gave: the surveyed inputs, or the volumes
+        at the form's nodes}, of inputs that the readings of the survey depend on: the temperature
+        of a tape that has that of the shell.
     """
 
     solid: Part
@@ -195,7 +196,7 @@ class SolidPart(Part):
         if "diameter" in self.surveyed:
             found["offset"] = 2 * found["diameter"]
         if self.read_with:
-            by_survey = self._by_survey(found)
+            by_survey = self._by_survey(levels_m, found)
             for name, column in self.read_with.items():
                 found[name] = found.get(name, 0.0) + by_survey @ column
         without = {*self.unused, *self.surveyed}
@@ -206,14 +207,17 @@ class SolidPart(Part):
         own = tuple(self.solid.sources(self._of_solid(levels_m)))
         if not self.surveyed:
             return own
-        if self.form is None:
-            by_survey = self._by_survey(self.solid.derivatives(levels_m))
-            return (*(one.source(by_survey @ one.columns) for one in self.factors), *own)
-        weights = self.form.at(self._shares(levels_m))
-        return (*(one.source(weights @ one.columns) for one in self.form.factors), *own)
+        of_solid = self.solid.derivatives(levels_m) if self.form is None else {}
+        by_survey = self._by_survey(levels_m, of_solid)
+        factors = self.factors if self.form is None else self.form.factors
+        return (*(one.source(by_survey @ one.columns) for one in factors), *own)
 
-    def _by_survey(self, found):
-        """(rows, f) derivatives by the inputs that the survey gave, of those by all."""
+    def _by_survey(self, levels_m, found):
+        """(rows, f) derivatives by what the survey gave: the nodes of its form, or the surveyed of
+        those by all inputs.
+        """
+        if self.form is not None:
+            return self.form.at(self._shares(levels_m))
         return np.column_stack([found[name] for name in self.surveyed])
 
     @property
@@ -224,12 +228,13 @@ class SolidPart(Part):
         return np.asarray(levels_m, dtype=float) / self._stretch
 
     def _shares(self, levels_m):
-        return np.asarray(levels_m, dtype=float) / self.top_m
+        share, _ = self.solid.height_share(self._of_solid(levels_m))
+        return share
 
     def _formed_area(self, levels_m, volume, area):
         """Of the wall, from volume and area of the solid at its own levels."""
-        shares = self._shares(levels_m)
-        slope = self.form.factor_slope(shares) / self.top_m
+        shares, by_level = self.solid.height_share(self._of_solid(levels_m))
+        slope = self.form.factor_slope(shares) * by_level / self._stretch
         return area * self.form.factor(shares) / self._stretch + volume * slope
 
     def _formed(self, levels_m, found):
@@ -323,7 +328,7 @@ class Body:
 
     def only_shell(self):
         """The body of the shell of courses alone."""
-        return replace(self, parts=(self.shell,))
+        return replace(self, parts=(self.shell,), highest_m=self.shell.volume.height_m)
 
     def undeclared(self):
         """Names of the inputs that move some volume of the tank and have no declared u.

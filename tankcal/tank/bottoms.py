@@ -19,32 +19,34 @@ from tankcal.messages import message
 from tankcal.tank.parts import Part, as_levels
 from tankcal.tank.soundings import SurveyedSurface, surveyed_surface
 from tankcal.tank.terrain import Surface, surface
+from tankcal.tank.tips import FORMS as TIPS
+from tankcal.tank.tips import Tip, tip_of
 from tankcal.uncertainty import Source
 
-FORMS = ("flat", "cone", "dish")
+FORMS = ("flat", *TIPS)
 LEAN_AZIMUTHS = 720  # of the triangles of a leaning plate
 
 
 @dataclass(frozen=True)
 class ShapedBottom(Part):
-    """A level plate, a cone, or a dish that is part of a sphere; its edge lies at level 0.
-
-    Over an outline that is no circle the form is that over a circle, drawn out to the outline along
-    each radius, so areas and volumes depend on the plan's area alone.
+    """A level plate, or a head with a level edge at level 0, dished down or up; `shaped_bottom`.
 
     Attributes
     ----------
     form : str
-        "flat", "cone" or "dish".
+        One of FORMS.
     centre_m : float
         Level of the centre: above 0 the bottom bulges up, below 0 down.
     plan_m2 : float
         Inside area of the first course at its bottom.
+    tip : Tip or None
+        The head; None for a level plate.
     """
 
     form: str
     centre_m: float
     plan_m2: float
+    tip: Tip | None = None
     kind = "bottom"
 
     @property
@@ -58,76 +60,64 @@ class ShapedBottom(Part):
         return (self.lowest_m,)
 
     def volume_m3(self, levels_m):
-        """(rows,) closed form: a cone holds A d^3 / (3 H^2), a dish pi d^2 (R - d / 3).
-
-        d is the depth at the centre, H that of the edge, R the radius of the sphere.
-        """
-        levels, rise = as_levels(levels_m), self.centre_m
-        if rise <= 0:
-            return self._tip_m3(np.clip(levels - rise, 0, -rise))
-        return self._tip_m3(rise - np.clip(levels, 0, rise)) - self._tip_m3(rise)
+        """(rows,) of the head below the edge, less what one that bulges up takes above it."""
+        levels = as_levels(levels_m)
+        return self._of_tip(levels, self.tip.beyond_m3) if self.tip else 0.0 * levels
 
     def area_m2(self, levels_m):
         """(rows,) derivative of `volume_m3` by the level."""
         return self._wet_m2(levels_m) - self.plan_m2 * (as_levels(levels_m) >= 0)
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} by "datum" (level), "bottom" and "scale", m3 per SI unit.
+        """{input: (rows,)} by "datum" (level), "bottom", "scale" and sizes, m3 per SI unit.
 
         bottom lifts the whole bottom: minus its wetted plan area. scale stretches the plan.
+        bottom_depth moves the centre away from the edge, dish_radius and knuckle_radius are those
+        of a torispherical head that was given by them.
         """
-        levels, rise = as_levels(levels_m), self.centre_m
-        by_scale = 2 * self.volume_m3(levels)
-        if self.form == "dish":
-            sag = np.clip(levels - rise, 0, -rise) if rise < 0 else rise - np.clip(levels, 0, rise)
-            whole = rise if rise > 0 else 0.0
-            by_scale = self._dish_by_scale(sag) - self._dish_by_scale(whole)
-        return {
+        levels = as_levels(levels_m)
+        found = {
             "datum": self.area_m2(levels),
             "bottom": -self._wet_m2(levels),
-            "scale": by_scale,
+            "scale": 0.0 * levels,
         }
+        if self.tip is None:
+            return found
+        for name in self.tip.derivatives(0.0):
+            said = "bottom_depth" if name == "depth" else name
+            found[said] = self._of_tip(levels, lambda x, name=name: self.tip.derivatives(x)[name])
+        return found
 
-    @property
-    def _sphere_m(self):
-        return (self.plan_m2 / np.pi / abs(self.centre_m) + abs(self.centre_m)) / 2
-
-    def _tip_m3(self, depth):
-        """Volume of the cone or dish between its tip and the depth from it."""
-        if self.centre_m == 0:
-            return 0.0 * depth
-        if self.form == "cone":
-            return self.plan_m2 * depth**3 / (3 * self.centre_m**2)
-        return np.pi * depth**2 * (self._sphere_m - depth / 3)
-
-    def _tip_m2(self, depth):
-        if self.form == "cone":
-            return self.plan_m2 * (depth / self.centre_m) ** 2
-        return np.pi * depth * (2 * self._sphere_m - depth)
-
-    def _dish_by_scale(self, depth):
-        return self.plan_m2 / abs(self.centre_m) * depth**2
+    def _of_tip(self, levels, beyond):
+        """What the head adds at levels, by what it has beyond a plane."""
+        if self.centre_m <= 0:
+            return beyond(np.clip(-levels, 0, self.tip.depth_m))
+        return beyond(np.clip(levels, 0, self.tip.depth_m)) - beyond(0.0)
 
     def _wet_m2(self, levels_m):
-        levels, rise = as_levels(levels_m), self.centre_m
-        if rise == 0:
+        levels = as_levels(levels_m)
+        if self.tip is None:
             return self.plan_m2 * (levels >= 0)
-        if rise < 0:
-            return self._tip_m2(np.clip(levels - rise, 0, -rise))
-        return (self.plan_m2 - self._tip_m2(rise - np.clip(levels, 0, rise))) * (levels >= 0)
+        depth = self.tip.depth_m
+        if self.centre_m < 0:
+            return self.tip.area_m2(np.clip(-levels, 0, depth))
+        return (self.plan_m2 - self.tip.area_m2(np.clip(levels, 0, depth))) * (levels >= 0)
 
 
-def shaped_bottom(form, plan_m2, centre_m=0.0):
-    """A flat, conical or dished bottom; a centre at level 0 makes it flat.
+def shaped_bottom(form, plan_m2, centre_m=0.0, dish_radius_m=None, knuckle_radius_m=None):
+    """A flat bottom, or a head; a centre at level 0 makes it flat.
 
     Parameters
     ----------
     form : str
-        "flat", "cone" or "dish".
+        One of FORMS.
     plan_m2 : float
         Inside area of the first course at its bottom.
     centre_m : float, optional
-        Level of the centre: above 0 the bottom bulges up, below 0 down.
+        Level of the centre: above 0 the bottom bulges up, below 0 down. 0 for a torispherical one
+        of given radii, which bulges down.
+    dish_radius_m, knuckle_radius_m : float, optional
+        Of a torispherical bottom: one beside the centre, or both.
 
     Returns
     -------
@@ -137,7 +127,7 @@ def shaped_bottom(form, plan_m2, centre_m=0.0):
     ------
     SolutionError
         For an unknown form, an area that cannot be, a flat bottom with a centre off the plane, and
-        a dish deeper than half a sphere.
+        sizes that make no such head (a dish deeper than half a sphere).
 
     Examples
     --------
@@ -166,15 +156,12 @@ def shaped_bottom(form, plan_m2, centre_m=0.0):
                 centre_m=centre_m,
             )
         )
-    if form == "dish" and abs(centre_m) > np.sqrt(plan_m2 / np.pi):
-        raise SolutionError(
-            message(
-                "dish_too_deep",
-                "a dish {depth_m:g} m deep is more than half a sphere",
-                depth_m=abs(centre_m),
-            )
-        )
-    return ShapedBottom("flat" if centre_m == 0 else form, float(centre_m), float(plan_m2))
+    radii = (dish_radius_m, knuckle_radius_m)
+    if centre_m == 0 and None in radii:
+        return ShapedBottom("flat", 0.0, float(plan_m2))
+    tip = tip_of(form, plan_m2, abs(centre_m), *radii)
+    centre = float(centre_m) if centre_m else -tip.depth_m
+    return ShapedBottom(form, centre, float(plan_m2), tip)
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,7 @@ class LiquidHead(Part):
     volume   the shell as surveyed
     hoops    its courses, from the bottom up
     density_kg_m3  of the liquid that the table is for; 0: the empty shell
+    headroom_m  how far above the shell, in a head on top, its liquid may stand
     survey_density_kg_m3, survey_level_m  liquid during the survey; level above the bottom of the
              first course
     """
@@ -76,6 +77,7 @@ class LiquidHead(Part):
     density_kg_m3: float
     survey_density_kg_m3: float
     survey_level_m: float
+    headroom_m: float = 0.0
 
     @property
     def breakpoints_m(self):
@@ -89,7 +91,7 @@ class LiquidHead(Part):
     def volume_m3(self, levels_m):
         """(rows,) change of the volume below each level; 0 below the bottom.
 
-        Raises HeightError for a level above the shell.
+        Raises HeightError for a level above the shell and the head on it.
         """
         return self._sums(levels_m)[0]
 
@@ -123,7 +125,8 @@ class LiquidHead(Part):
     def _sums(self, levels_m):
         """(1 + inputs, rows) volume and its derivatives."""
         levels = as_levels(levels_m)
-        top = self.volume.height_m
+        shell = self.volume.height_m
+        top = shell + self.headroom_m
         inside = levels <= top * (1 + 1e-12)
         if not np.all(inside):
             raise HeightError(
@@ -139,8 +142,8 @@ class LiquidHead(Part):
         for index, (hoop, below) in enumerate(zip(self.hoops, self._below, strict=True)):
             rows = np.flatnonzero(place == index)
             own = levels[rows]
-            found = _load(self, hoop, own, own)
-            found[1] += _at_surface(self, hoop, own)
+            found = _load(self, hoop, own, np.minimum(own, shell) if self.headroom_m else own)
+            found[1] += _at_surface(self, hoop, own) * ((own < shell) | (self.headroom_m == 0))
             found += below[:, :1] + (below[:, 1:2] + below[:, 2:] * own) * own
             sums[:, rows] = found
         return sums
@@ -167,6 +170,7 @@ def liquid_head(
     survey_level_m=0.0,
     gravity_m_s2=STANDARD_GRAVITY,
     scale=1.0,
+    headroom_m=0.0,
 ):
     """What the head of the liquid adds to a shell, course by course as thin hoops.
 
@@ -186,6 +190,8 @@ def liquid_head(
     gravity_m_s2 : float
     scale : float, default 1
         Of horizontal lengths, as `course_shape` was given it.
+    headroom_m : float, default 0
+        How far above the shell the table's liquid may stand, in a head on top of it.
 
     Returns
     -------
@@ -240,7 +246,7 @@ def liquid_head(
         _hoop(course, plate, youngs_modulus_pa, gravity_m_s2, scale, *survey)
         for course, plate in zip(volume.courses, thicknesses, strict=True)
     ]
-    return LiquidHead(volume, tuple(hoops), float(density_kg_m3), *survey)
+    return LiquidHead(volume, tuple(hoops), float(density_kg_m3), *survey, headroom_m)
 
 
 def _refuse_numbers(modulus, gravity, *others):

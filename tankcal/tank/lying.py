@@ -1,6 +1,6 @@
 """What lying tanks have in common: pieces along an axis, and a liquid whose surface cuts them.
 
-Volumes and free surfaces of `heads`' arcs, each at its place along the axis s, below a surface at
+Volumes and free surfaces of `arcs`, each at its place along the axis s, below a surface at
 
     c(s) = c_p - tilt (s - p),   c_p = -r + d stretch,   d the dip, r the radius at its zero p,
 
@@ -14,8 +14,9 @@ import numpy as np
 
 from tankcal.errors import HeightError, SolutionError
 from tankcal.messages import message
-from tankcal.tank.heads import Cut, EllipseArc, Line, depth_of, integrate, meridian
-from tankcal.tank.parts import Part
+from tankcal.tank.arcs import Cut, EllipseArc, Line, integrate
+from tankcal.tank.heads import depth_of, meridian
+from tankcal.tank.parts import Solid
 
 ROUNDING = 1e-9  # of the highest dip: a dip so little outside is the top or the bottom itself
 
@@ -44,7 +45,7 @@ class Piece:
     ring: int = 0
 
 
-class LyingSolid(Part):
+class LyingSolid(Solid):
     """A lying tank as the sum of `Piece`s.
 
     A subclass has `tilt`, `dip_from_a_m`, `dip_direction`, `top_m`, `_pieces`, and `_radius_m`, the
@@ -68,7 +69,11 @@ class LyingSolid(Part):
 
     def area_m2(self, levels_m):
         """(rows,) derivative of the volume by the dip; the free surface, when the dip is plumb."""
-        return self._squeeze * self._stretch * self._sum(levels_m, Cut.chord)
+        return self._squeeze * self._depth_slope * self._sum(levels_m, Cut.chord)
+
+    def depth_m(self, levels_m):
+        """(rows,) depths square to the axis above the bottom of the section of each dip."""
+        return self._stretch * np.asarray(levels_m, dtype=float)
 
     def _sum(self, levels_m, integrand):
         """(rows,) integral over the whole tank; equal ends of a level one are integrated once."""
@@ -99,7 +104,7 @@ class LyingSolid(Part):
     def _liquid_m(self, levels_m, s):
         """(rows,) height of the liquid above the axis at s, in the round tank of equal area."""
         levels = levels_inside(levels_m, self._highest_m)
-        above_dip_zero = self._stretch * levels - self.tilt * (s - self.dip_from_a_m)
+        above_dip_zero = self.depth_m(levels) - self.tilt * (s - self.dip_from_a_m)
         return self._squeeze * above_dip_zero - self._radius_m
 
     @property
@@ -108,20 +113,26 @@ class LyingSolid(Part):
         return self.top_m
 
     @property
+    def _depth_slope(self):
+        """Derivative of the depth by the dip."""
+        return self._stretch
+
+    @property
     def _stretch(self):
         """Heights square to the axis to dips."""
         return np.hypot(1.0, self.tilt) if self.dip_direction == "plumb" else 1.0
 
 
-def pieces_of_ends(ends, length_m, last_ring=0):
+def pieces_of_ends(ends, length_m, last_ring=0, upward=1.0):
     """`Piece`s of the ends.
 
-    ends  (End, radius of the cylinder there) of A and of B
+    ends    (End, radius of the cylinder there) of A and of B
+    upward  as of `heads.meridian`
     """
     places = ("a", 0.0, -1, 0), ("b", length_m, 1, last_ring)
     for (end, radius), (name, origin, out, ring) in zip(ends, places, strict=True):
         sign = -1 if end.inward else 1
-        for arc in meridian(end, radius):
+        for arc in meridian(end, radius, upward):
             yield Piece(arc, origin, sign * out, sign, name, ring)
 
 

@@ -101,6 +101,14 @@ class Part(Protocol):
         return volume + over * self.area_m2(np.array([highest_m]))[0]
 
 
+class Solid(Part):
+    """A part that is a whole tank; its highest dip is `top_m`."""
+
+    def height_share(self, levels_m):
+        """(rows,) levels as a share of the highest one, and its slope."""
+        return np.asarray(levels_m, dtype=float) / self.top_m, 1 / self.top_m
+
+
 def as_levels(levels_m):
     """(rows,) levels as floats, of an array or of one number."""
     return np.atleast_1d(np.asarray(levels_m, dtype=float))

@@ -6,7 +6,7 @@ the ring at s = p, of radius R_p, and cos the cosine of the tilt, the liquid sta
     depth(s) = (p - s) m + h / cos + R_i - R_p,   0 <= depth <= 2 R_i,
 
 square to the axis in ring i. The quadrature breaks at joints and where the surface meets the bottom
-or the top of a ring (`heads.integrate`).
+or the top of a ring (`arcs.integrate`).
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,8 @@ from functools import cached_property, partial
 import numpy as np
 
 from tankcal.errors import SolutionError
-from tankcal.tank.heads import Cut, End, Line, depth_of
+from tankcal.tank.arcs import Cut, Line
+from tankcal.tank.heads import RADII, End, depth_of
 from tankcal.tank.lying import (
     LyingSolid,
     Piece,
@@ -133,27 +134,30 @@ class RingedTank(LyingSolid):
                          of a ring together; the ring of the dip takes the zero along
         ring_lengths     (rows, rings) each its own; what lies beyond moves away, A and the dip stay
         ring_axes        (rows, rings) how far the axis of each stands above the common one
-        end_depth, tilt, dip_position, datum, scale
+        end_depth, dish, knuckle, tilt, dip_position, datum, scale
                          as of `solids.LyingTank`
         plate_thickness  of plates that were taken off outside measures: all radii are less by it,
                          each end less deep; the lengths stay
         paint            the same of the radii alone
         """
         integrands = [Cut.segment, Cut.chord, Cut.chord_moment]
-        integrands += [Cut.by_radius, Cut.by_end_depth, Cut.by_end_plate]
+        inputs = ("radius", "end_depth", "end_plate", *RADII)
+        integrands += [partial(Cut.by, name=name) for name in inputs]
         cylinder = [*integrands, *(partial(Cut.by_wave, order=order) for order in WAVES)]
         found = [
             (piece, self._integrals(piece, levels_m, integrands if piece.end else cylinder))
             for piece in self._pieces
         ]
         rings = len(self.radii_m)
-        volume, surface, by_depth = (sum(one[i] for _, one in found) for i in (0, 1, 4))
+        volume, surface, by_depth, by_dish, by_knuckle = (
+            sum(one[i] for _, one in found) for i in (0, 1, 4, 6, 7)
+        )
         by_plate = sum(piece.sign * one[5] for piece, one in found)
         moment = sum(self._moment(piece, one[1], one[2]) for piece, one in found)
         of_ring = np.zeros((2, len(surface), rings))  # surface, and by the radius
         for piece, one in found:
             of_ring[:, :, piece.ring] += one[[1, 3]]
-        waves = np.stack([one[6:].T for piece, one in found if not piece.end], axis=1)
+        waves = np.stack([one[8:].T for piece, one in found if not piece.end], axis=1)
         own = np.eye(rings)[self.zero_ring]
         zero = -surface[:, None] * own  # of what moves the bottom of the dip's ring
         by_radii = of_ring[1] + zero
@@ -168,6 +172,8 @@ class RingedTank(LyingSolid):
             "ring_lengths": self._by_lengths(levels, of_ring[0], of_end_b),
             "ring_axes": -of_ring[0] - zero,
             "end_depth": by_depth,
+            "dish": by_dish,
+            "knuckle": by_knuckle,
             "tilt": by_stretch * levels * surface - moment,
             "dip_position": self.tilt * surface,
             "plate_thickness": by_plate - by_radii.sum(axis=1),

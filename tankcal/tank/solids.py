@@ -5,11 +5,15 @@ room count from the inside bottom, in metres; dips outside the tank raise Height
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
-from tankcal.tank.heads import Cut, End, Line
+from tankcal.errors import SolutionError
+from tankcal.messages import message
+from tankcal.tank.arcs import Cut, Line
+from tankcal.tank.gauge_tubes import GaugeTube
+from tankcal.tank.heads import RADII, End
 from tankcal.tank.lying import (
     LyingSolid,
     Piece,
@@ -20,9 +24,10 @@ from tankcal.tank.lying import (
     refuse_meeting_ends,
     require_length,
 )
-from tankcal.tank.parts import Part
+from tankcal.tank.parts import Solid
 
 FLAT = End("flat")
+TUBE = ("tube_angle", "tube_offset")  # inputs of a gauge tube
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,8 @@ class LyingTank(LyingSolid):
         c_p = -B + d (square),   c_p = -B + d sqrt(1 + tilt^2) (plumb),   c(s) = c_p - tilt (s - p).
 
     The highest dip is where its line meets the top of the cylinder: 2 B, plumb 2 B sqrt(1+tilt^2).
+    With a gauge tube off the axis or off the plumb, of a round tank only, c_p = depth(d) - B, its
+    d times sqrt(1 + tilt^2) where it is read plumb (`GaugeTube`).
     Sections of an end are similar to that of the cylinder. An elliptical tank is computed as the
     round one of equal section area, with heights times sqrt(width height) / (2 B), which is exact;
     the radii and the spherical form of an end are those of that round tank.
@@ -56,6 +63,11 @@ class LyingTank(LyingSolid):
         Place of the dip's zero, along the axis from the start of the cylinder at A.
     dip_direction : str
         "plumb": the dip is read along the vertical; "square": square to the axis.
+    tube_angle_rad : float
+        Of the gauge tube off the plumb, in the plane of the section; its top leans to the right as
+        seen from A. 0: plumb.
+    tube_offset_m : float
+        Distance at which the tube passes the axis, to the right of it as seen from A, when plumb.
 
     Raises
     ------
@@ -64,7 +76,7 @@ class LyingTank(LyingSolid):
 
     References
     ----------
-    Jones 2001, Computing fluid tank volumes (untilted); the tilt by quadrature, `heads`.
+    Jones 2001, Computing fluid tank volumes (untilted); the tilt by quadrature, `arcs`.
     """
 
     width_m: float
@@ -76,21 +88,51 @@ class LyingTank(LyingSolid):
     roll_rad: float = 0.0
     dip_from_a_m: float = 0.0
     dip_direction: str = "plumb"
+    tube_angle_rad: float = 0.0
+    tube_offset_m: float = 0.0
 
     def __post_init__(self):
         require_length("width", self.width_m)
         require_length("height", self.height_m)
         require_length("length", self.length_m)
         check_directions(self.dip_direction, self.tilt, self.roll_rad)
-        ends = (self.end_a, self._radius_m), (self.end_b, self._radius_m)
-        refuse_meeting_ends(ends, self.length_m)
+        self._check_round()
+        refuse_meeting_ends(self._ends, self.length_m)
         shift = 2 * self._half_height_m * self.tilt
         check_dip(self.dip_from_a_m, self.dip_direction, shift, self.length_m)
+
+    def _check_round(self):
+        """What only a round section has: a tube off its axis, and a rolled guppy end."""
+        ends = {self.end_a.kind, self.end_b.kind}
+        if self._is_round:
+            GaugeTube(self._radius_m, self.tube_angle_rad, self.tube_offset_m)
+        elif self._has_tube or (self.roll_rad and "guppy" in ends):
+            raise SolutionError(
+                message(
+                    "round_section_only",
+                    "a section {width_m:g} m wide and {height_m:g} m high: expected a round one, "
+                    "for a gauge tube off the axis or the plumb, or rolled guppy ends",
+                    width_m=self.width_m,
+                    height_m=self.height_m,
+                )
+            )
 
     @property
     def top_m(self):
         """The highest dip."""
+        if self._has_tube:
+            return self._tube.full_m * self._stretch
         return 2 * self._half_height_m * self._stretch
+
+    def depth_m(self, levels_m):
+        """(rows,) depths square to the axis above the lowest point of the section of each dip."""
+        along = super().depth_m(levels_m)
+        return self._tube.depth_m(along) if self._has_tube else along
+
+    def height_share(self, levels_m):
+        """(rows,) the plumb dip of each depth as a share of the highest one, and its slope."""
+        high = 2 * self._half_height_m * self._stretch**2  # of the depth at that dip
+        return self.depth_m(levels_m) / high, self._depth_slope / high
 
     def derivatives(self, levels_m):
         """{input: (rows,)} derivative of the volume at a fixed dip by each input, all else fixed.
@@ -98,7 +140,9 @@ class LyingTank(LyingSolid):
         diameter         width and height both; ends keep their depths (torispherical: their radii)
         length           of the cylinder; B moves away, A and the place of the dip stay
         end_depth        of both ends, each the way it bulges; flat ends have none, torispherical
-                         ones are stretched along the axis
+                         ones of given radii are stretched along the axis
+        dish, knuckle    radii of both ends, where torispherical ones were given by them
+        tube_angle, tube_offset  of the gauge tube, of a round tank only
         tilt             the tangent; the dip's zero stays where it is
         dip_position     dip_from_a_m
         plate_thickness  of plates that were taken off outside measures: the diameter is less by
@@ -108,23 +152,31 @@ class LyingTank(LyingSolid):
         scale            of all lengths of the tank and the place of the dip, but not of the dips
         """
         integrands = [Cut.segment, Cut.chord, Cut.chord_moment]
-        integrands += [Cut.by_radius, Cut.by_end_depth, Cut.by_end_plate]
+        inputs = ("radius", "end_depth", "end_plate", *RADII)
+        integrands += [partial(Cut.by, name=name) for name in inputs]
         found = [(piece, self._integrals(piece, levels_m, integrands)) for piece in self._pieces]
-        volume, surface, _, by_radius, by_depth, _ = sum(one for _, one in found)
+        volume, surface, _, by_radius, by_depth, _, by_dish, by_knuckle = sum(
+            one for _, one in found
+        )
         moment = sum(self._moment(piece, one[1], one[2]) for piece, one in found)
         surface_of_b = sum(one[1] for piece, one in found if piece.end == "b")
         by_plate = sum(piece.sign * one[5] for piece, one in found)
         levels = np.asarray(levels_m, dtype=float)
-        squeeze, tilt, stretch = self._squeeze, self.tilt, self._stretch
-        by_stretch = tilt / stretch if self.dip_direction == "plumb" else 0.0
-        datum = squeeze * stretch * surface
+        squeeze, tilt, stretch, slope = self._squeeze, self.tilt, self._stretch, self._tube.slope
+        by_stretch = tilt / stretch * slope if self.dip_direction == "plumb" else 0.0
+        datum = squeeze * self._depth_slope * surface
         by_squeeze = stretch * levels * surface - tilt * moment
+        by_tube = self._tube.derivatives(stretch * levels)
         radius_by, squeeze_by = self._by_diameter
-        diameter = radius_by * (by_radius - surface) + squeeze_by * by_squeeze
-        return {
+        by_radius = by_radius - (1 - by_tube["radius"]) * surface
+        diameter = radius_by * by_radius + squeeze_by * by_squeeze
+        of_tube = {name: by_tube[name] * surface for name in TUBE if self._is_round}
+        return of_tube | {
             "diameter": diameter,
             "length": self._section_m2(levels, self.length_m) - squeeze * tilt * surface_of_b,
             "end_depth": by_depth,
+            "dish": by_dish,
+            "knuckle": by_knuckle,
             "tilt": squeeze * (by_stretch * levels * surface - moment),
             "dip_position": squeeze * tilt * surface,
             "plate_thickness": by_plate - 2 * diameter,
@@ -135,12 +187,33 @@ class LyingTank(LyingSolid):
     @cached_property
     def _pieces(self):
         barrel = Line(0.0, self.length_m, self._radius_m, 0.0, {"radius": (1.0, 0.0)})
-        ends = (self.end_a, self._radius_m), (self.end_b, self._radius_m)
-        return Piece(barrel, 0.0, 1, 1, ""), *pieces_of_ends(ends, self.length_m)
+        ends = pieces_of_ends(self._ends, self.length_m, upward=np.cos(self.roll_rad))
+        return Piece(barrel, 0.0, 1, 1, ""), *ends
+
+    @property
+    def _ends(self):
+        return (self.end_a, self._radius_m), (self.end_b, self._radius_m)
 
     @property
     def _has_twins(self):
         return self.tilt == 0 and self.end_a == self.end_b
+
+    @property
+    def _has_tube(self):
+        """Whether the dip is not that of the lowest point of the section."""
+        return bool(self.tube_angle_rad or self.tube_offset_m)
+
+    @property
+    def _is_round(self):
+        return self.width_m == self.height_m
+
+    @property
+    def _depth_slope(self):
+        return self._stretch * self._tube.slope
+
+    @cached_property
+    def _tube(self):
+        return GaugeTube(self._radius_m, self.tube_angle_rad, self.tube_offset_m)
 
     @cached_property
     def _radius_m(self):
@@ -168,7 +241,7 @@ class LyingTank(LyingSolid):
 
 
 @dataclass(frozen=True)
-class Sphere(Part):
+class Sphere(Solid):
     """A spherical tank; dips count from its lowest inside point: V = pi d^2 (3 R - d) / 3.
 
     Attributes

@@ -56,6 +56,13 @@ class ShellVolume:
         """(f,) the areas that every volume is a sum of, m2."""
         return np.concatenate([course.areas_m2 for course in self.courses])
 
+    @property
+    def top_weights(self):
+        """(f,) derivative of the area at the top by the features."""
+        weights = np.zeros(len(self.features))
+        weights[-LEVELS:] = _height_polynomials().sum(axis=0)
+        return weights
+
     @cached_property
     def girth_features(self):
         """(f,) what the features lose by metre of inset, m."""

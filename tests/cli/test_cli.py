@@ -161,6 +161,17 @@ def test_a_survey_without_a_wall_exits_with_3(tmp_path, capsys):
     assert "nominal" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("kind", "survey"),
+    [("horizontal", "reference-line"), ("sphere", "reference-line"), ("mesh", "strapping")],
+)
+def test_new_refuses_a_survey_of_another_kind(tmp_path, kind, survey, capsys):
+    folder = tmp_path / "mine"
+    assert main(["new", str(folder), "--kind", kind, "--survey", survey]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not folder.exists()
+
+
 def test_new_writes_a_job_and_refuses_a_full_folder(tmp_path, capsys):
     assert main(["new", str(tmp_path / "mine")]) == 0
     assert {"job.toml", "points.csv", "courses.csv", "job.xlsx"} <= {

@@ -7,9 +7,11 @@ from tankcal.geometry.field.amplitudes import Amplitudes
 from tankcal.geometry.field.places import (
     DEGREES,
     OF_CYLINDERS,
+    OF_GREAT_CIRCLES,
     OF_SPHERES,
     CylinderFunctionals,
     OnCylinder,
+    OnGreatCircles,
     OnSphere,
     cap_integrals,
     cells_along,
@@ -54,8 +56,15 @@ def test_a_departure_of_a_cylinder_is_a_covariance_of_unit_variance(one):
 
 @pytest.mark.parametrize("one", OF_SPHERES)
 def test_a_departure_of_a_sphere_is_a_covariance_of_unit_variance(one):
+    """That of its own weight has unit variance over the sphere, not at each place."""
     found = on_sphere(np.random.default_rng(1)).covariance(one)
     assert np.linalg.eigvalsh(found).min() > -1e-6
+    if one.shape == "zonal":
+        up, weights = np.polynomial.legendre.leggauss(9)
+        zone = np.column_stack([np.sqrt(1 - up**2), np.zeros(9), up])
+        each = OnSphere(3.0, zone).covariance(one).diagonal()
+        assert weights @ each / 2 == pytest.approx(1.0)
+        return
     assert found.diagonal() == pytest.approx(np.ones(len(found)), abs=1e-9)
 
 
@@ -115,6 +124,57 @@ def test_functionals_of_a_sphere_are_those_of_points_on_it():
     expected = each * 2 * np.pi * (1 - cosine)
     found = places.across(one, cap_integrals(np.array([cosine])))[0]
     assert found == pytest.approx(expected, abs=0.02 * np.abs(expected).max() + 0.005)
+
+
+NORMALS = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.6, 0.8, 0.0]])
+
+
+def circle_of(normal, count=400):
+    """(count, 3) directions on a great circle."""
+    first = np.cross(normal, [0.3, 0.4, 0.85])
+    first /= np.linalg.norm(first)
+    turn = 2 * np.pi * np.arange(count) / count
+    return np.outer(np.cos(turn), first) + np.outer(np.sin(turn), np.cross(normal, first))
+
+
+@pytest.mark.parametrize("one", OF_GREAT_CIRCLES[1:3])
+def test_means_over_great_circles(one):
+    """Second method: the covariance between places, less its degree 2, averaged over circles."""
+    radius = 10.0
+    shares = np.concatenate([np.zeros(2), degree_shares(one, radius)])
+    shares[2] = 0.0
+    places = OnGreatCircles(radius, NORMALS)
+    found = places.covariance(one)
+    circles = [circle_of(normal) for normal in NORMALS]
+    for i, first in enumerate(circles):
+        for j, second in enumerate(circles):
+            cosine = np.clip(first @ second.T, -1, 1)
+            expected = np.polynomial.legendre.legval(cosine, shares).mean()
+            assert found[i, j] == pytest.approx(expected, abs=1e-6)
+    cosine, node = 0.3, np.polynomial.legendre.legvander(-circles[1][:, 2], DEGREES[-1])[:, 2:]
+    functional = cap_integrals(np.array([cosine]))
+    expected = (functional * shares[2:]) @ node.T
+    assert places.across(one, functional)[0, 1] == pytest.approx(expected.mean(), abs=1e-9)
+
+
+def test_band_about_the_equator():
+    """Second method: its profile on the equator and over a meridian, less degrees 0 and 2."""
+    one = OF_GREAT_CIRCLES[3]
+    up, weights = np.polynomial.legendre.leggauss(400)
+    profile = np.exp(-((np.arcsin(up) / one.width_m) ** 2))
+    second = 1.5 * up**2 - 0.5
+    mean, flat = weights @ profile / 2, 5 / 2 * weights @ (profile * second)
+    latitude = np.pi * (np.arange(4000) + 0.5) / 4000 - np.pi / 2
+    over = np.exp(-((latitude / one.width_m) ** 2)).mean()
+    expected = np.array([1 - mean + flat / 2, over - mean - flat / 4, over - mean - flat / 4])
+    found = OnGreatCircles(10.0, NORMALS).covariance(one)
+    assert found == pytest.approx(np.outer(expected, expected), abs=1e-5)
+    cap = cap_integrals(np.array([0.2]))
+    inside = OnGreatCircles(10.0, NORMALS).within(one, cap)[0, 0]
+    fine = np.linspace(-1, -0.2, 20_001)
+    fine = (fine[1:] + fine[:-1]) / 2
+    rest = np.exp(-((np.arcsin(fine) / one.width_m) ** 2)) - mean - flat * (1.5 * fine**2 - 0.5)
+    assert inside == pytest.approx((2 * np.pi * rest.sum() * 0.8 / 20_000) ** 2, rel=1e-4)
 
 
 def drawn(rng, places, variances, noise_m):

@@ -365,8 +365,8 @@ def test_unused_settings_may_be_blank_zero_or_false(tmp_path):
         "bottom.form": "",
         "table.other_densities_kg_m3": [],
     }
-    job = load(write_job(tmp_path / "job", kind="sphere", settings=nothing))
-    assert_same_job(job, load(write_job(tmp_path / "plain", kind="sphere")))
+    job = load(write_job(tmp_path / "job", kind="horizontal", settings=nothing))
+    assert_same_job(job, load(write_job(tmp_path / "plain", kind="horizontal")))
 
 
 def warnings_of(path):

@@ -140,6 +140,11 @@ SLIPS = {
         "size_beside_rings",
         ("job.toml", "horizontal.diameter_m"),
     ),
+    "a tube off the axis": (
+        lambda p: p.settings.update({"horizontal.tube_offset_m": 0.1}),
+        "tube_beside_rings",
+        ("job.toml", "horizontal.tube_offset_m"),
+    ),
     "a dip that leaves the top": (
         lambda p: p.settings.update({"horizontal.dip_from_a_m": 8.99}),
         "dip_leaves_top",
@@ -243,6 +248,6 @@ def test_spoilt_jobs_give_a_result_or_lines(tmp_path):
         try:
             tankcal.run(tankcal.load(folder), simulated=False)
         except TankcalError as error:
-            told += error.args
+            told += getattr(error, "problems", error.args)
     assert told
     assert [one for one in told if "\n" in str(one)] == []

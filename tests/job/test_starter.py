@@ -21,11 +21,12 @@ from tankcal.job.contract import (
     REGISTERS_OF_SURVEY,
     SURVEYS,
     TABLES_OF_KIND,
+    columns_of,
 )
 from tankcal.job.fields import Field
 from tankcal.job.rule_files import LIMITS, RULE, parse_rule, shipped_names
 from tankcal.job.starter import write_starter
-from tankcal.job.starter.form import DECLARED, METERED, STRAPPED
+from tankcal.job.starter.form import DECLARED, METERED, OF_GREAT_CIRCLES, STRAPPED
 from tankcal.job.starter.page import filled_page
 from tankcal.job.tables import Log
 from tankcal.tank.rules import TANKS
@@ -73,6 +74,7 @@ def assert_written(starter, kind):
         suiting = [
             field for field in fields if field.suits(kind) and not field.of_survey and not strapped
         ]
+        suiting = [one for one in suiting if (section, one.name) not in OF_GREAT_CIRCLES]
         assert list(settings.get(section, {})) == [field.name for field in suiting]
         assert all(field.note in text for field in suiting)
     for table in TABLES_OF_KIND[kind]:
@@ -122,8 +124,9 @@ def test_a_starter_for_a_survey(tmp_path, survey):
         assert list(tomllib.loads(text)[register]["NAME"]) == fields
     for table in SURVEYS[survey]:
         text = (starter / f"{table}.csv").read_text(encoding="utf-8")
-        assert text.splitlines()[-1].split(",") == [field.name for field in COLUMNS[table]]
-        assert all(f"# {field.name}: {field.note}" in text for field in COLUMNS[table])
+        fields = columns_of(table, "vertical")
+        assert text.splitlines()[-1].split(",") == [field.name for field in fields]
+        assert all(f"# {field.name}: {field.note}" in text for field in fields)
     book = openpyxl.load_workbook(starter / "job.xlsx")
     assert book.sheetnames == ["read me", "job", *registers, *tables, "# inputs"]
 

@@ -6,7 +6,7 @@ import subprocess
 import pytest
 
 from tankcal.cli import main
-from tankcal.job.contract import SURVEYS
+from tankcal.job.contract import SURVEYS_OF_KIND, tables_of_survey
 from tankcal.job.starter.form import METERED
 from tankcal.job.starter.texts import texts_in
 from tankcal.report.field_forms import (
@@ -26,12 +26,18 @@ HIGH_MM, ROW_MM = 245, 7  # of what is written on a page, and of a row
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
-@pytest.mark.parametrize("survey", [one for one in BY_PEN if one != METERED])
-def test_every_table_of_readings_has_a_sheet(survey, language):
-    found = [block.data for block in sheets(survey, language)]
+@pytest.mark.parametrize(
+    ("kind", "survey"),
+    [
+        *(("vertical", one) for one in BY_PEN if one != METERED),
+        *((kind, one) for kind, own in SURVEYS_OF_KIND.items() for one in own),
+    ],
+)
+def test_every_table_of_readings_has_a_sheet(kind, survey, language):
+    found = [block.data for block in sheets(survey, language, kind)]
     titles = [one["text"] for one in found if one["kind"] == "heading"]
     words = texts_in(language).words["input"]
-    tables = [table for table in SURVEYS[survey] if table not in OF_THE_OFFICE]
+    tables = [one for one in tables_of_survey(kind, survey) if one not in OF_THE_OFFICE]
     of_heights = texts_in(language).words["forms"]["heights"]
     assert (of_heights in titles) == (survey in ("tangents", "wall-hits"))
     told = "; ".join(one for one in titles if one != of_heights).split("; ")
@@ -57,7 +63,12 @@ def test_new_writes_them(tmp_path, survey, capsys):
 
 
 def test_a_sheet_has_room():
-    tables = {"rings", *(table for survey in BY_PEN for table in SURVEYS[survey])}
+    tables = {
+        table
+        for kind in ("vertical", *SURVEYS_OF_KIND)
+        for survey in BY_PEN
+        for table in tables_of_survey(kind, survey)
+    }
     assert {name for names, _ in FORMS for name in names} == tables - set(OF_THE_OFFICE)
 
 

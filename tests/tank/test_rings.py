@@ -131,6 +131,35 @@ def test_derivatives_by_each_ring(name, field, place):
     assert_derivative(volumes, getattr(tank, field), tank.derivatives(dips)[name], tolerance=1e-6)
 
 
+@pytest.mark.parametrize(
+    "ends",
+    [
+        (End("torispherical", 0.5, knuckle_radius_m=0.24), End("guppy", 0.9)),
+        (End("torispherical", dish_radius_m=2.4, knuckle_radius_m=0.24), End("conical", 0.5)),
+    ],
+)
+def test_rings_have_every_end(ends):
+    """Truth: the cylinder of equal rings; differences of volumes by radii and by sizes of ends."""
+    tank, dips = replace(UNLIKE, end_a=ends[0], end_b=ends[1]), np.array([0.03, 0.4, 1.3, 2.2])
+    equal = replace(tank, radii_m=(1.2,) * 3)
+    one = LyingTank(2.4, 2.4, 7.5, *ends, tilt=tank.tilt, dip_from_a_m=tank.dip_from_a_m)
+    assert equal.volume_m3(dips) == pytest.approx(one.volume_m3(dips), abs=1e-12)
+    assert equal.capacity_m3 == pytest.approx(one.capacity_m3, abs=1e-12)
+    by_equal, by_one = equal.derivatives(dips), one.derivatives(dips)
+    for name in ("end_depth", "dish", "knuckle", "tilt"):
+        assert by_equal[name] == pytest.approx(by_one[name], abs=1e-12)
+
+    def by_radii(x):
+        return replace(tank, radii_m=tuple(x)).volume_m3(dips)
+
+    def by_knuckle(x):
+        return replace(tank, end_a=replace(ends[0], knuckle_radius_m=x[0])).volume_m3(dips)
+
+    found = tank.derivatives(dips)
+    assert_derivative(by_radii, tank.radii_m, found["ring_radii"], tolerance=1e-6)
+    assert_derivative(by_knuckle, (0.24,), found["knuckle"][:, None], tolerance=1e-6)
+
+
 @pytest.mark.parametrize(("name", "field"), [("tilt", "tilt"), ("dip_position", "dip_from_a_m")])
 def test_derivatives_by_place(name, field):
     """Truth: differences of volumes."""

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from jacobians import assert_derivative
 
 from tankcal.errors import HeightError, SolutionError
-from tankcal.tank.heads import KINDS, Cut, End, depth_of, integrate, meridian
+from tankcal.tank.arcs import Cut, integrate
+from tankcal.tank.heads import KINDS, End, depth_of, meridian
 from tankcal.tank.solids import FLAT, LyingTank, Sphere
 
 INCH = 0.0254
@@ -24,7 +25,9 @@ END = {
     "ellipsoidal": End("ellipsoidal", 0.5),
     "spherical": End("spherical", 0.3),
     "torispherical": End("torispherical", dish_radius_m=2.1, knuckle_radius_m=0.2),
+    "guppy": End("guppy", 0.6),
 }
+SYMMETRIC = [kind for kind in KINDS if kind != "guppy"]
 
 
 def round_tank(end_a="flat", end_b=None, **changes):
@@ -85,7 +88,7 @@ def test_sphere_published():
 FILLS = np.array([0.003, 0.03, 0.11, 0.2, 0.35, 0.5, 0.62, 0.8, 0.93, 0.999])
 
 
-@pytest.mark.parametrize("kind", ["conical", "ellipsoidal", "spherical"])
+@pytest.mark.parametrize("kind", ["conical", "ellipsoidal", "spherical", "guppy"])
 @pytest.mark.parametrize("depth", [0.02, 0.3, 0.77, 1.0])
 def test_level_tanks_other_program(kind, depth, figure):
     geometry = pytest.importorskip("fluids.geometry")
@@ -344,7 +347,7 @@ def variants(kind):
     return [End(kind, depth) for depth in (0.02, 0.3, 0.7, 1.0)]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SYMMETRIC)
 def test_level_tanks_are_symmetric(kind):
     """V(h) + V(D - h) = capacity."""
     tank = round_tank(kind)
@@ -354,7 +357,7 @@ def test_level_tanks_are_symmetric(kind):
     )
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SYMMETRIC)
 def test_tilted_tank_with_equal_ends_is_symmetric(kind):
     tank = round_tank(kind, tilt=0.08, dip_from_a_m=2.5, dip_direction="square")
     dip = np.linspace(0, 2, 101)
@@ -580,7 +583,7 @@ def test_dips_outside_are_errors():
         (lambda: LyingTank(2.0, 2.0, 5.0, End("flat", 0.3)), "has no depth"),
         (lambda: LyingTank(2.0, 2.0, 5.0, End("conical")), "depth 0 m"),
         (lambda: LyingTank(2.0, 2.0, 5.0, End("spherical", 1.2)), "1.2 m deep on a radius of 1 m"),
-        (lambda: LyingTank(2.0, 2.0, 5.0, End("torispherical", 0.3)), "needs the radii"),
+        (lambda: LyingTank(2.0, 2.0, 5.0, End("torispherical", 0.3)), "two of three sizes"),
         (
             lambda: LyingTank(2.0, 2.0, 5.0, End("torispherical", 0.0, 0.9, 0.1)),
             "dish of 0.9 m on a radius of 1 m",

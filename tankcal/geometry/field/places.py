@@ -7,6 +7,7 @@ v_l P_l(cos angle) over the degrees l from 2 on.
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy.sparse
@@ -18,6 +19,8 @@ WRAPS = np.arange(-2, 3)  # turns of a circumference that a short covariance is 
 CELL_M, LARGEST_CELL_M = 0.15, 120  # along the axis; cells of it at most
 AROUND = 144  # cells around a cylinder
 DEGREES = np.arange(2, 161)  # of the Legendre polynomials of a sphere's departures
+ZONAL = np.sqrt(5.0)  # P_2 over its rms on a sphere
+AT_EQUATOR = np.polynomial.legendre.legvander(np.zeros(1), DEGREES[-1])[0, 2:]  # P_l(0)
 MOST_SITES, CELL_GROWTH = 600, 1.15  # of more points the means of neighbours count
 
 
@@ -28,13 +31,15 @@ class Departure:
     Attributes
     ----------
     kind : str
-        Its name in a budget: "bulge", "ovality" or "seams".
+        Its name in a budget: "bulge", "ovality", "oblateness", "legs" or "seams".
     shape : str
         Around a cylinder "mean" (the mean radius), "first" (the axis moves), "oval" (mode k of
-        variance k^-3, from 2 on) or "local" (lost over `width_m` along the arc). On a sphere "oval"
-        (degree l of variance l^-3, from 2 on) or "local".
+        variance k^-3, from 2 on) or "local" (lost over `width_m` of the arc). On a sphere "oval"
+        (degree l of variance l^-3, from 2 on), "local", or "zonal" (P_2 about the vertical: what
+        its own weight makes of it); of its great circles "band", about the equator, where legs
+        press a sphere in.
     width_m : float
-        Of a local one, along the arc.
+        Of a local one, along the arc; of a band the latitude, rad.
     length_m : float
         Along the axis of a cylinder, over which it is lost; inf: it runs along the whole tank.
     median_m, log_sd : float
@@ -64,6 +69,13 @@ OF_SPHERES = (
     Departure("ovality", "oval", 0.0, 0.0, 3e-3, 2.0),
     Departure("seams", "local", 0.4, 0.0, 4e-3, 1.5),
     Departure("seams", "local", 1.2, 0.0, 3e-3, 1.5),
+    Departure("oblateness", "zonal", 0.0, 0.0, 3e-3, 2.0),
+)
+OF_GREAT_CIRCLES = (  # whose size no strap tells
+    Departure("ovality", "oval", 0.0, 0.0, 2e-3, 0.0),
+    Departure("seams", "local", 0.4, 0.0, 2e-3, 0.0),
+    Departure("seams", "local", 1.2, 0.0, 2e-3, 0.0),
+    Departure("legs", "band", 0.15, 0.0, 2.5e-3, 0.0),
 )
 
 
@@ -188,6 +200,8 @@ class OnSphere:
 
     def covariance(self, one):
         """(n, n) of one departure of unit variance between the places."""
+        if one.shape == "zonal":
+            return np.outer(*(self._flattened() for _ in "ab"))
         cosine = np.clip(self.direction @ self.direction.T, -1.0, 1.0)
         return _zonal(cosine, degree_shares(one, self.radius_m))
 
@@ -196,13 +210,75 @@ class OnSphere:
 
         functionals  (f, degrees) what each makes of P_l of the angle from the bottom
         """
+        if one.shape == "zonal":
+            return np.outer(ZONAL * functionals[:, 0], self._flattened())
         shares = degree_shares(one, self.radius_m)
-        nadir = np.polynomial.legendre.legvander(-self.direction[:, 2], DEGREES[-1])[:, 2:]
-        return (functionals * shares) @ nadir.T
+        return (functionals * shares) @ _nadir_waves(self.direction).T
 
     def within(self, one, functionals):
         """(f, f) covariance of functionals by one departure itself."""
+        if one.shape == "zonal":
+            return ZONAL**2 * np.outer(functionals[:, 0], functionals[:, 0])
         return (functionals * degree_shares(one, self.radius_m)) @ functionals.T
+
+    def _flattened(self):
+        """(n,) of the places, of a sphere that is flattened by an rms of one."""
+        return ZONAL * (1.5 * self.direction[:, 2] ** 2 - 0.5)
+
+
+@dataclass(frozen=True)
+class OnGreatCircles:
+    """Mean radii of great circles of a sphere, known by the normals (n, 3) of their planes.
+
+    The mean of P_l of the angle from a place, over a great circle, is P_l(0) times that of the
+    angle from the place to the normal. What an ellipsoid has, the degree 2, is no departure.
+    """
+
+    radius_m: float
+    normal: np.ndarray
+    departures = OF_GREAT_CIRCLES
+
+    def covariance(self, one):
+        """(n, n) of one departure of unit variance between the means."""
+        if one.shape == "band":
+            return np.outer(*(self._of_band(one) for _ in "ab"))
+        shares = self._shares(one) * AT_EQUATOR**2
+        return _zonal(np.clip(self.normal @ self.normal.T, -1.0, 1.0), shares)
+
+    def across(self, one, functionals):
+        """(f, n) covariance of functionals with the means, as `OnSphere.across`."""
+        if one.shape == "band":
+            return np.outer(functionals @ _band(one), self._of_band(one))
+        of_means = functionals * self._shares(one) * AT_EQUATOR
+        return of_means @ _nadir_waves(self.normal).T
+
+    def within(self, one, functionals):
+        """(f, f) covariance of functionals by one departure itself."""
+        if one.shape == "band":
+            return np.outer(*(functionals @ _band(one) for _ in "ab"))
+        return (functionals * self._shares(one)) @ functionals.T
+
+    def _of_band(self, one):
+        """(n,) means of a band over the circles."""
+        return _nadir_waves(self.normal) @ (_band(one) * AT_EQUATOR)
+
+    def _shares(self, one):
+        return np.where(DEGREES == 2, 0.0, degree_shares(one, self.radius_m))
+
+
+@cache
+def _band(one):
+    """(degrees,) what a band about the equator has of P_l, but for the degree 2."""
+    up, weights = np.polynomial.legendre.leggauss(2 * DEGREES[-1])
+    profile = np.exp(-((np.arcsin(up) / one.width_m) ** 2))
+    waves = np.polynomial.legendre.legvander(up, DEGREES[-1])[:, 2:]
+    found = (2 * DEGREES + 1) / 2 * ((weights * profile) @ waves)
+    return np.where(DEGREES == 2, 0.0, found)
+
+
+def _nadir_waves(direction):
+    """(n, degrees) P_l of the angles of directions from below."""
+    return np.polynomial.legendre.legvander(-direction[:, 2], DEGREES[-1])[:, 2:]
 
 
 def degree_shares(one, radius_m):
@@ -212,6 +288,14 @@ def degree_shares(one, radius_m):
     else:
         found = (2 * DEGREES + 1) * (DEGREES**2 + (radius_m / one.width_m) ** 2) ** -2.5
     return found / found.sum()
+
+
+def cap_volumes(levels_m, area_m2, radius_m):
+    """(k, degrees) what P_l of the angle from the bottom adds to volumes below levels of a sphere.
+
+    Dips count from the wall itself: it takes the free surface along.
+    """
+    return radius_m**2 * cap_integrals(1 - levels_m / radius_m) - area_m2[:, None]
 
 
 def cap_integrals(cosine):

@@ -4,12 +4,13 @@ Each check tells `log` its problems and warnings and returns nothing. A check wh
 missing or bad stays silent: what is wrong with them has been told already.
 """
 
-from tankcal.job.checking import has_rows
+from tankcal.job.checking import has_rows, loads_sphere
 from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.checks.clouds import check_clouds
 from tankcal.job.checks.extent import (
     Extent,
     extent_of,
+    has_great_circles,
     has_radii,
     has_survey,
     has_wall_points,
@@ -20,6 +21,7 @@ from tankcal.job.checks.extent import (
     wall_of,
 )
 from tankcal.job.checks.geometry import check_cylinder, check_scan
+from tankcal.job.checks.great_circles import check_great_circles
 from tankcal.job.checks.hits import check_hits
 from tankcal.job.checks.lines import check_lines
 from tankcal.job.checks.liquid import check_liquid
@@ -39,6 +41,7 @@ from tankcal.job.contract.points import check_points
 from tankcal.job.contract.roof import check_roof
 from tankcal.job.contract.ship import check_ship
 from tankcal.job.contract.stated import check_stated
+from tankcal.job.contract.top import check_top
 from tankcal.job.contract.uncertainty import check_inputs
 from tankcal.job.contract.welds import check_welds
 from tankcal.job.entries import kind_of
@@ -64,6 +67,8 @@ def check_all(values, tables, registers, raw, is_whole, log):
             check_tangents(values, tables, registers, raw, log)
         if kind_of(raw) == "horizontal":
             check_rings(values, tables, registers, raw, log)
+        if kind_of(raw) == "sphere":
+            check_great_circles(values, tables, registers, raw, log)
         check_clouds(values, tables, registers, raw, log)
         check_liquid(values, tables, registers, raw, log)
         if values is not None:
@@ -111,13 +116,21 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
         if points is not None:
             check_cylinder(points, tables, values, raw, log)
         check_bottom(values, tables["bottom"], points, extent, raw, log)
+        check_top(values, is_metered(tables), raw, log)
         check_roof(values["roof"], extent, raw, log)
     elif has_rows(points):
         check_scan(points, values, kind, raw, log)
     if kind == "horizontal":
         check_horizontal(values, wall_of(tables), raw, log, height_of_rings(tables))
     if kind == "sphere":
-        check_sphere(values, has_wall_points(tables), raw, log)
+        check_sphere(
+            values,
+            has_wall_points(tables),
+            has_great_circles(tables),
+            loads_sphere(values),
+            raw,
+            log,
+        )
     if kind == "mesh":
         check_ship(values, tables, raw, log)
     if tables["deadwood"] is not None:

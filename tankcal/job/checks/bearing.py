@@ -1,8 +1,9 @@
 """Which inputs of uncertainty.csv have an effect on a job, and why the others have none."""
 
-from tankcal.job.checking import has_rows
+from tankcal.job.checking import has_rows, loads_sphere
 from tankcal.job.checks.extent import (
     has_clouds,
+    has_great_circles,
     has_hits,
     has_radii_alone,
     has_wall_points,
@@ -12,14 +13,23 @@ from tankcal.job.checks.extent import (
     wall_of,
 )
 from tankcal.job.contract import INPUTS
-from tankcal.job.contract.bottom import bottom_form
+from tankcal.job.contract.bottom import SHAPED, bottom_form
+from tankcal.job.contract.lying import RINGS_WITHOUT_TUBE, ROUND_TUBE
 from tankcal.job.contract.ship import is_ship
 from tankcal.messages import message
 
+GIVEN = ("dish", "knuckle")
+SIZES_OF_END = ("depth_m", "dish_radius_m", "knuckle_radius_m", "standard")
+NO_SUCH_RADIUS = message(
+    "no_such_radius", "expected only with a torispherical end that is given by this radius"
+)
 NOT_SUBTRACTED = message(
     "nothing_subtracted",
     "expected only with side = outside: with side = inside nothing is subtracted",
 )
+
+NO_HEAD = message("no_liquid_head", "expected only with a liquid head: table.liquid_density_kg_m3")
+NO_SURVEY_LIQUID = message("no_survey_liquid", "expected only with survey.liquid_level_m above 0")
 
 
 def useless_inputs(values, tables, kind):
@@ -40,6 +50,7 @@ def useless_inputs(values, tables, kind):
         rules |= _of_horizontal(values, tables)
     elif kind == "sphere":
         rules |= _of_wall(values["sphere"], values, has_wall_points(tables))
+        rules |= _of_sphere(values, tables)
     elif kind == "mesh":
         rules |= _of_ship(values)
     return others | {name: why for name, why in rules.items() if why}
@@ -81,12 +92,6 @@ def _of_vertical(values, tables):
     survey, switches = values["survey"], values["corrections"]
     head = values["table"]["liquid_density_kg_m3"] and switches["head"] is not False
     no_liquid = not survey["liquid_level_m"] or switches["head"] is False
-    no_head = message(
-        "no_liquid_head", "expected only with a liquid head: table.liquid_density_kg_m3"
-    )
-    no_survey_liquid = message(
-        "no_survey_liquid", "expected only with survey.liquid_level_m above 0"
-    )
     no_roof = values["roof"]["mass_kg"] is None or switches["roof"] is False
     of_points = message(
         "offset_of_points",
@@ -95,12 +100,13 @@ def _of_vertical(values, tables):
     )
     return _of_plates(values, tables, head or not no_liquid) | {
         "offset": of_points if _has_own_offset(tables) else "",
-        "course_heights": _of_heights(tables["courses"]),
-        "youngs_modulus": no_head if not head and no_liquid else "",
-        "liquid_density": "" if head else no_head,
-        "survey_level": no_survey_liquid if no_liquid else "",
-        "survey_density": no_survey_liquid if no_liquid else "",
+        "course_heights": _of_heights(tables["courses"], values),
+        "youngs_modulus": NO_HEAD if not head and no_liquid else "",
+        "liquid_density": "" if head else NO_HEAD,
+        "survey_level": NO_SURVEY_LIQUID if no_liquid else "",
+        "survey_density": NO_SURVEY_LIQUID if no_liquid else "",
         "bottom": _of_bottom(values, tables["bottom"]),
+        **_of_heads(values, tables["bottom"]),
         "roof_mass": message("no_floating_roof", "expected only with a floating roof: [roof]")
         if no_roof
         else "",
@@ -142,6 +148,28 @@ def _of_bottom(values, bottom):
     }.get(bottom_form(values, bottom), "")
 
 
+def _of_heads(values, bottom):
+    """Sizes of a shaped bottom and of a head on top, where they are on."""
+    form, top = bottom_form(values, bottom), values["top"]["form"]
+    off = {part: values["corrections"][part] is False for part in ("bottom", "top")}
+    heads = [
+        {**values[part], "form": shape, "depth_m": values[part][key]}
+        for part, shape, key in (("bottom", form, "centre_z_m"), ("top", top, "depth_m"))
+        if shape == "torispherical" and not off[part]
+    ]
+    shaped = form in SHAPED and not off["bottom"]
+    headed = top is not None and not off["top"]
+    return {
+        **_of_radii_of(heads),
+        "bottom_depth": ""
+        if shaped
+        else message("no_shaped_bottom", "expected only with a bottom that is a cone or a head"),
+        "top_depth": ""
+        if headed
+        else message("no_top", "expected only with a head on the shell: [top]"),
+    }
+
+
 def _of_plates(values, tables, is_loaded, of="courses"):
     """Plates count where they are subtracted or loaded, paint where it is subtracted.
 
@@ -167,8 +195,9 @@ def _of_plates(values, tables, is_loaded, of="courses"):
     return why
 
 
-def _of_heights(courses):
-    is_one = courses is not None and len(courses.rows) + courses.skipped == 1
+def _of_heights(courses, values):
+    headed = values["top"]["form"] is not None and values["corrections"]["top"] is not False
+    is_one = not headed and courses is not None and len(courses.rows) + courses.skipped == 1
     return message("only_one_course", "expected only with two courses or more") if is_one else ""
 
 
@@ -187,6 +216,8 @@ def _of_horizontal(values, tables):
             "end_depth": message("ends_are_flat", "expected only with an end that is not flat")
             if all_flat
             else "",
+            **_of_radii_of_ends(given),
+            **dict.fromkeys(("tube_angle", "tube_offset"), _of_tube(given, wall)),
             "tilt": _from_points(has_points) or switched_off,
             "dip_position": ""
             if leans
@@ -228,6 +259,32 @@ def _of_ship(values):
     return of_pipe | {"contraction": "" if contracts else no_contraction}
 
 
+def _of_radii_of_ends(given):
+    """Radii that the job gives, or a standard."""
+    ends = [{key: given[f"end_{end}_{key}"] for key in SIZES_OF_END} for end in "ab"]
+    return _of_radii_of(ends)
+
+
+def _of_radii_of(heads):
+    return {
+        name: "" if any(_gives(name, one) for one in heads) else NO_SUCH_RADIUS for name in GIVEN
+    }
+
+
+def _gives(name, end):
+    """Is a radius, "dish" or "knuckle", among the sizes that an end or a head is given by?"""
+    by_standard = end["standard"] and (name == "knuckle" or not end["depth_m"])
+    return bool(end[f"{name}_radius_m"] or by_standard)
+
+
+def _of_tube(given, wall):
+    if wall == "straps":
+        return RINGS_WITHOUT_TUBE
+    if None in (given["width_m"], given["height_m"]):
+        return ""
+    return ROUND_TUBE
+
+
 def _of_wall(given, values, has_points):
     """What horizontal cylinders and spheres share."""
     switched_off = values["corrections"]["plate"] is False
@@ -243,6 +300,32 @@ def _of_wall(given, values, has_points):
         else message("no_points", "expected only with points; without points, declare diameter"),
         "plate_thickness": "" if outside and given["thickness_mm"] else nothing,
     }
+
+
+def _of_sphere(values, tables):
+    """What great circles tell, and what widens a sphere."""
+    table, survey = values["table"], values["survey"]
+    off = values["corrections"]["head"] is False
+    liquid = (survey["liquid_density_kg_m3"] or 0) * (survey["liquid_level_m"] or 0)
+    rules = {
+        "youngs_modulus": loads_sphere(values)
+        or message("no_load_of_sphere", "expected only with a pressure or a liquid that loads it"),
+        "liquid_density": (table["liquid_density_kg_m3"] and not off) or NO_HEAD,
+        "pressure": (table["pressure_bar"] and not off)
+        or message("no_table_pressure", "expected only with table.pressure_bar above 0"),
+        "survey_pressure": (survey["pressure_bar"] and not off)
+        or message("no_survey_pressure", "expected only with survey.pressure_bar above 0"),
+        **dict.fromkeys(
+            ("survey_level", "survey_density"), (liquid and not off) or NO_SURVEY_LIQUID
+        ),
+    }
+    found = {name: why for name, why in rules.items() if isinstance(why, str)}
+    if has_great_circles(tables):
+        found["diameter"] = message("from_circles", "its uncertainty comes from the great circles")
+    plate = (values["survey"]["side"] == "outside") and values["corrections"]["plate"] is not False
+    if loads_sphere(values) and values["sphere"]["thickness_mm"] and not plate:
+        found["plate_thickness"] = ""  # it gives way to what loads it
+    return found
 
 
 def _from_points(has_points):

@@ -6,8 +6,9 @@ import numpy as np
 
 from tankcal.clouds.inside.floor_cells import reach_of_floor
 from tankcal.job.checking import has_rows, zero_z
-from tankcal.job.contract.bottom import OF_CLOUD
+from tankcal.job.contract.bottom import OF_CLOUD, rise_of_bottom
 from tankcal.job.contract.observations import READINGS
+from tankcal.job.contract.top import depth_of_top
 
 
 def has_survey(tables):
@@ -43,6 +44,11 @@ def has_clouds(tables):
 def is_metered(tables):
     """Was metered liquid filled in, or drawn off, between dips?"""
     return has_rows(tables.get("liquid"))
+
+
+def has_great_circles(tables):
+    """Was a tape put round a sphere?"""
+    return has_rows(tables.get("great_circles"))
 
 
 def has_radii(tables):
@@ -121,6 +127,9 @@ def extent_of(values, tables, kind):
         return _of_horizontal(values["horizontal"], values, wall_of(tables) is not None)
     if kind == "sphere":
         diameter = values["sphere"]["diameter_m"] or values["tank"]["nominal_diameter_m"]
+        if diameter is None and has_great_circles(tables):
+            readings = tables["great_circles"].numbers("reading_m")
+            diameter = np.nanmedian(readings) / np.pi if np.any(readings > 0) else None
         area = None if diameter is None else np.pi / 4 * diameter**2
         return _lying(diameter, 0.0, area, values, has_wall_points(tables))
     return Extent()
@@ -132,14 +141,15 @@ def _of_vertical(values, bottom):
     area = None if diameter is None else np.pi / 4 * diameter**2
     if None in (shell_z, zero):
         return Extent(height, area_m2=area)
-    centre = values["bottom"]["centre_z_m"]
-    lowest = [shell_z - zero] if centre is None else [shell_z - zero, centre - zero]
+    rise = rise_of_bottom(values)
+    lowest = [shell_z - zero] if rise is None else [shell_z - zero, shell_z + rise - zero]
     if bottom is not None:
         lowest += [z - zero for z in bottom.of("z_m") if z is not None]
         lowest += [level for level in bottom.of("level_m") if level is not None]
     if values["bottom"]["form"] == OF_CLOUD and diameter is not None:
         lowest.append(shell_z - zero - reach_of_floor(diameter / 2))  # how deep it is looked for
-    top = None if height is None else shell_z + height - zero
+    over = depth_of_top(values)
+    top = None if None in (height, over) else shell_z + height + over - zero
     return Extent(height, min(lowest), top, area)
 
 

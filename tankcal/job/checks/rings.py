@@ -39,7 +39,7 @@ def check_rings(values, tables, registers, raw, log):
     refuse_repeats_elsewhere(straps, "from_a_m", log)
     _tell_rings_not_strapped(rings, straps, log)
     _check_places(rings, straps, log)
-    check_readings(tables, registers, raw, log)
+    check_readings(straps, tables, registers, raw, log)
     if values is not None:
         check_strapping_settings(values, tables, registers, True, raw, log)
 

@@ -10,6 +10,7 @@ from tankcal.job.checking import (
     tell,
 )
 from tankcal.job.checks.extent import has_wall_points
+from tankcal.job.contract.bottom import rise_of_bottom
 from tankcal.job.plausibility import DENSITIES_KG_M3
 from tankcal.messages import message
 
@@ -265,8 +266,9 @@ def bottoms_z(values, tables, kind):
     if values["datum"]["bottom_z_m"] is None:
         return []
     surveyed = [] if tables["bottom"] is None else tables["bottom"].of("z_m")
-    found = [values["datum"]["bottom_z_m"], values["bottom"]["centre_z_m"], *surveyed]
-    return [z for z in found if z is not None]
+    edge, rise = values["datum"]["bottom_z_m"], rise_of_bottom(values)
+    centre = None if rise is None else edge + rise
+    return [z for z in (edge, centre, *surveyed) if z is not None]
 
 
 def _check_survey_liquid(survey, extent, raw, log):

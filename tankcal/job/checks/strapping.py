@@ -45,7 +45,7 @@ def check_strapping(values, tables, registers, raw, log):
     alone = _stands_alone(tables, raw)
     every = alone and not has_radii(tables) and raw.tables.get("radii", ()) is not None
     _check_courses(straps, tables, courses, known, every, log)
-    check_readings(tables, registers, raw, log)
+    check_readings(straps, tables, registers, raw, log)
     if has_rows(tables["thickness"]):
         refuse_others(tables["thickness"], "course", known, log)
     if values is not None:
@@ -53,10 +53,14 @@ def check_strapping(values, tables, registers, raw, log):
         check_levels(straps, courses, values, log)
 
 
-def check_readings(tables, registers, raw, log):
-    """The tapes that were read, what was in their way, and their comparison with a master."""
-    straps, tapes = tables["circumferences"], tapes_of(registers)
+def check_readings(straps, tables, registers, raw, log):
+    """The tapes that were read, what was in their way, and their comparison with a master.
+
+    straps  readings, with the names of their circumferences
+    """
+    tapes = tapes_of(registers)
     _check_tapes(straps, registers["instruments"], tapes, raw, log)
+    _check_pulls(straps, log)
     _check_obstructions(tables["obstructions"], set(straps.of("circumference")), log)
     if has_rows(tables["obstructions"]):
         check_spans(tables["obstructions"], straps, tapes_read(straps, tapes), tapes, raw, log)
@@ -89,7 +93,7 @@ def tapes_read(straps, tapes):
 def tell_without_effect(tables, log):
     """Warnings about tables that belong to circumferences, where there are none."""
     for name in ("obstructions", "thickness", "tape_checks"):
-        if has_rows(tables[name]):
+        if has_rows(tables.get(name)):
             expected = message(
                 "not_strapped", "without effect: the job has no circumferences by tape"
             )
@@ -160,6 +164,10 @@ def refuse_others(table, column, known, log):
 
 
 def _check_tapes(straps, instruments, tapes, raw, log):
+    """A tape for each reading, and of each what its readings need.
+
+    straps  readings with instrument; instruments, tapes  {name: {key: value}}
+    """
     file = raw.file_of("instruments")
     for row, name, tape in zip(
         straps.rows, straps.of("instrument"), tapes_read(straps, tapes), strict=True
@@ -179,12 +187,6 @@ def _check_tapes(straps, instruments, tapes, raw, log):
                 hint=nearest(tape, tapes) if found is None else "",
             )
             log.problem(straps.file, expected, row, "instrument")
-    for row, pulls in zip(straps.rows, straps.of("pulls"), strict=True):
-        if pulls is not None and pulls != int(pulls):
-            expected = message(
-                "part_of_a_pull", "found {pulls:g}; expected a whole number", pulls=pulls
-            )
-            log.problem(straps.file, expected, row, "pulls")
     if "instruments" not in raw.registers or raw.registers["instruments"] is None:
         return
     rows = raw.registers["instruments"].rows
@@ -195,6 +197,15 @@ def _check_tapes(straps, instruments, tapes, raw, log):
         refuse_free_scale(given, file, rows.get(name), name, log)
         for key, expected in _missing_of(given, tapes):
             log.problem(file, expected, rows.get(name), f"{name}.{key}")
+
+
+def _check_pulls(straps, log):
+    for row, pulls in zip(straps.rows, straps.of("pulls"), strict=True):
+        if pulls is not None and pulls != int(pulls):
+            expected = message(
+                "part_of_a_pull", "found {pulls:g}; expected a whole number", pulls=pulls
+            )
+            log.problem(straps.file, expected, row, "pulls")
 
 
 def refuse_free_scale(given, file, row, name, log):
@@ -244,6 +255,7 @@ def _missing_of(given, tapes):
 
 
 def _check_obstructions(table, names, log):
+    """Obstructions on circumferences of these names, with the lengths of their kinds."""
     if not has_rows(table):
         return
     refuse_others(table, "circumference", names, log)
@@ -269,6 +281,7 @@ def _check_obstructions(table, names, log):
 
 
 def _check_comparisons(table, tapes, raw, log):
+    """Comparisons of one working tape, where there is one."""
     working = [name for name, given in tapes.items() if given["master"] is not None]
     if has_rows(table) and len(working) != 1:
         expected = message(
@@ -300,19 +313,9 @@ def check_strapping_settings(values, tables, registers, alone, raw, log):
             " circle",
         )
         tell(log.problem, raw, "shell", "shape_sd_mm", expected)
-    expands = any(given["expansion_per_k"] for given in tapes.values())
-    read = None not in tables["circumferences"].of("temperature_c")
-    if expands and not read and is_not_given(raw, "survey", "shell_temperature_c"):
-        expected = message(
-            "tape_of_no_temperature",
-            "missing; expected it, or temperature_c of every reading: the tape expands",
-        )
-        tell(log.problem, raw, "survey", "shell_temperature_c", expected)
-    if alone and values["survey"]["side"] == "inside":
-        expected = message(
-            "strapped_inside", "found inside; expected outside: a tape lies on the outside"
-        )
-        tell(log.problem, raw, "survey", "side", expected)
+    check_tape_temperature(tables["circumferences"], tapes, raw, log)
+    if alone:
+        refuse_inside(values, raw, log)
     if alone and values["bottom"]["form"] in ("leaning", "points"):
         expected = message(
             "bottom_needs_axis",
@@ -320,6 +323,27 @@ def check_strapping_settings(values, tables, registers, alone, raw, log):
             form=values["bottom"]["form"],
         )
         tell(log.problem, raw, "bottom", "form", expected)
+
+
+def check_tape_temperature(straps, tapes, raw, log):
+    """The temperature of a tape that expands, or that of the shell that it lies on."""
+    expands = any(given["expansion_per_k"] for given in tapes.values())
+    read = None not in straps.of("temperature_c")
+    if expands and not read and is_not_given(raw, "survey", "shell_temperature_c"):
+        expected = message(
+            "tape_of_no_temperature",
+            "missing; expected it, or temperature_c of every reading: the tape expands",
+        )
+        tell(log.problem, raw, "survey", "shell_temperature_c", expected)
+
+
+def refuse_inside(values, raw, log):
+    """A problem where a wall that a tape alone measured is said to be measured inside."""
+    if values["survey"]["side"] == "inside":
+        expected = message(
+            "strapped_inside", "found inside; expected outside: a tape lies on the outside"
+        )
+        tell(log.problem, raw, "survey", "side", expected)
 
 
 def check_levels(straps, courses, values, log):

@@ -10,6 +10,7 @@ from tankcal.job.contract import (
     correlations,
     courses,
     deadwood,
+    great_circles,
     hits,
     lines,
     liquid,
@@ -22,6 +23,7 @@ from tankcal.job.contract import (
     stated,
     strapping,
     tangents,
+    top,
     uncertainty,
     welds,
 )
@@ -37,7 +39,7 @@ from tankcal.text.form_words import NOTES
 
 SECTIONS = (
     *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "ship"),
-    *("bottom", "roof"),
+    *("bottom", "top", "roof"),
     *("shell", "strapping", "liquid", "radii", "change"),
     *("corrections", "material", "checks", "inspection"),
     *("adjustment", "adjustment.camera", "certificate"),
@@ -46,9 +48,10 @@ SECTIONS = (
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES}
 COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | tangents.COLUMNS | stadia.COLUMNS
-COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS | rings.COLUMNS | SURVEY_COLUMNS
+COLUMNS |= great_circles.COLUMNS | clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS
+COLUMNS |= rings.COLUMNS | SURVEY_COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS | radii.KEYS
-_KEYS |= {"bottom": bottom.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
+_KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
 
 SURVEYS = ADJUSTED_SURVEYS | {
@@ -61,6 +64,17 @@ SURVEYS = ADJUSTED_SURVEYS | {
     "liquid": tuple(liquid.COLUMNS),
     "radii": tuple(radii.COLUMNS),
 }
+
+SURVEYS_OF_KIND = {  # with other tables than those of SURVEYS
+    "horizontal": {"strapping": (*strapping.COLUMNS, *rings.COLUMNS)},
+    "sphere": {"strapping": (*great_circles.COLUMNS, *great_circles.BESIDE)},
+}
+
+
+def tables_of_survey(kind, survey):
+    """Names of the tables of a survey of a kind of tank."""
+    return SURVEYS_OF_KIND.get(kind, {}).get(survey, SURVEYS[survey])
+
 
 REQUIRED_TABLES = {"vertical": ("points", "courses")}
 _OF_ALL = ("uncertainty", "correlations", "stated")
@@ -94,6 +108,8 @@ __all__ = [
     "REGISTER_KEYS",
     "REQUIRED_TABLES",
     "SURVEYS",
+    "SURVEYS_OF_KIND",
     "TABLES_OF_KIND",
     "columns_of",
+    "tables_of_survey",
 ]

@@ -3,28 +3,32 @@
 import numpy as np
 
 from tankcal.job.checking import has_rows, is_not_given, places_of, tell, zero_z
+from tankcal.job.contract.ends import check_radii, depth_of_head, torispherical_keys
 from tankcal.job.contract.kinds import VERTICAL
 from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.fields import Field
 from tankcal.messages import message
+from tankcal.tank.tips import FORMS as TIPS
 
 OF_CLOUD = "cloud"  # the form that scans of the job show
+SHAPED = tuple(TIPS)
 KEYS = (
     choice(
         "form",
         "form of the bottom; cloud: as scans from inside show it; blank: flat, or points or liquid"
         " when bottom.csv has their columns",
-        ("flat", "leaning", "cone", "dish", "points", "liquid", OF_CLOUD),
+        ("flat", "leaning", *SHAPED, "points", "liquid", OF_CLOUD),
         kinds=VERTICAL,
     ),
     number(
         "centre_z_m",
-        "cone and dish: z of the centre, in the frame of the points, metres; the edge is at"
-        " datum.bottom_z_m",
+        "cone, dish, ellipsoidal, torispherical: z of the centre, in the frame of the points,"
+        " metres; the edge is at datum.bottom_z_m",
         -1e5,
         1e5,
         kinds=VERTICAL,
     ),
+    *torispherical_keys("", "", VERTICAL),
 )
 
 
@@ -49,6 +53,7 @@ MIN_LEVELS = 2
 NARROW, PARTIAL = 0.01, 0.1  # spread (rms) over the diameter; that of a full disc is 0.25
 OUTSIDE_FACTOR, OUTSIDE_M = 1.05, 0.2  # of the nominal radius, which is not the real one
 RISE_FACTOR, STEEP_FACTOR, LEAST_DEPTH_M = 0.1, 0.1, 0.5  # of the diameter
+DEEPEST = {"cone": 5.0, "dish": 0.5, "ellipsoidal": 2.0, "torispherical": 0.5}  # the same
 OVERFULL, EMPTY = 1.5, 0.5  # volume of a slice over that of the full cross-section
 
 
@@ -118,31 +123,46 @@ def _has_its_columns(table, form, wanted, log):
     return not missing
 
 
+def rise_of_bottom(values):
+    """How far the centre of a shaped bottom lies above its edge, m; None: that is not known."""
+    given, diameter = values["bottom"], values["tank"]["nominal_diameter_m"]
+    if given["centre_z_m"] is not None:
+        edge = values["datum"]["bottom_z_m"]
+        return None if edge is None else given["centre_z_m"] - edge
+    depth = None if diameter is None else depth_of_head(given, None, diameter)
+    return None if depth is None else -depth
+
+
 def _check_centre(form, values, raw, log):
-    centre, edge = values["bottom"]["centre_z_m"], values["datum"]["bottom_z_m"]
+    given, edge = values["bottom"], values["datum"]["bottom_z_m"]
+    centre = given["centre_z_m"]
     diameter = values["tank"]["nominal_diameter_m"]
-    if form not in ("cone", "dish"):
+    if form not in SHAPED:
         if centre is not None:
             expected = message(
                 "bottom_centre_unused",
-                "given for a bottom of form {form}; expected only for a cone or a dish",
+                "given for a bottom of form {form}; expected only for a cone or another head",
                 form=form,
             )
             tell(log.problem, raw, "bottom", "centre_z_m", expected)
-        return
-    if is_not_given(raw, "bottom", "centre_z_m"):
+    elif form != "torispherical" and is_not_given(raw, "bottom", "centre_z_m"):
         expected = message(
             "bottom_centre_missing",
             "missing; expected the z of the centre of the {form}",
             form=form,
         )
         tell(log.problem, raw, "bottom", "centre_z_m", expected)
-    if None in (centre, edge, diameter):
+    rise = None if None in (centre, edge) else centre - edge
+    depth = rise and abs(rise)
+    check_radii("bottom", given, form, "centre_z_m", depth, diameter, raw, log)
+    if None in (rise, diameter) or form not in SHAPED:
         return
-    rise = centre - edge
-    deepest = diameter if form == "cone" else diameter / 2
-    height = values["tank"]["nominal_height_m"]
-    highest = diameter / 4 if height is None else min(diameter / 4, height)
+    _check_rise(form, rise, diameter, values["tank"]["nominal_height_m"], raw, log)
+
+
+def _check_rise(form, rise, diameter, height, raw, log):
+    deepest = DEEPEST[form] * diameter
+    highest = deepest if height is None else min(deepest, height)
     if not -deepest <= rise <= highest:
         expected = message(
             "bottom_centre_far",

@@ -1,10 +1,13 @@
 """The keys of job.toml that every kind of tank has, or most of them."""
 
-from tankcal.job.contract.kinds import KINDS, VERTICAL, WITH_POINTS
+from tankcal.job.contract.kinds import KINDS, LOADED, VERTICAL, WITH_POINTS
 from tankcal.job.contract.registers import CAMERA_SETTINGS
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.fields import Field
 from tankcal.text.languages import LANGUAGES
+
+SPHERE = ("sphere",)
+MOST_BAR = 50  # of a sphere that stores under pressure
 
 # The keys of [table].
 
@@ -49,13 +52,20 @@ TABLE = (
         "density of the liquid that loads the shell, kg/m3; 0 or blank: no head",
         0,
         3000,
-        kinds=VERTICAL,
+        kinds=LOADED,
+    ),
+    number(
+        "pressure_bar",
+        "gauge pressure in the sphere that the table is for, bar; 0 or blank: none",
+        0,
+        MOST_BAR,
+        kinds=SPHERE,
     ),
     Field(
         "other_densities_kg_m3",
         "numbers",
         "densities of further tables, kg/m3: 700; 850",
-        kinds=VERTICAL,
+        kinds=LOADED,
         low=0,
         above_low=True,
         high=3000,
@@ -139,14 +149,21 @@ SURVEY = (
         " empty",
         0,
         100,
-        kinds=VERTICAL,
+        kinds=LOADED,
     ),
     number(
         "liquid_density_kg_m3",
         "density of that liquid, kg/m3; 0 or blank: empty",
         0,
         3000,
-        kinds=VERTICAL,
+        kinds=LOADED,
+    ),
+    number(
+        "pressure_bar",
+        "gauge pressure in the sphere during the survey, bar; 0 or blank: none",
+        0,
+        MOST_BAR,
+        kinds=SPHERE,
     ),
 )
 DATUM = (
@@ -169,7 +186,10 @@ DATUM = (
     positive("reference_height_m", "gauge reference point above the table's zero, metres", 200),
 )
 MATERIAL = (
-    number("e_gpa", "Young's modulus of the shell, GPa; blank: 206", 40, 500, kinds=VERTICAL),
+    number("e_gpa", "Young's modulus of the shell, GPa; blank: 206", 40, 500, kinds=LOADED),
+    number(
+        "poisson", "Poisson's ratio of the shell of a sphere; blank: 0.3", 0.1, 0.45, kinds=SPHERE
+    ),
     positive("expansion_per_k", "thermal expansion of the shell, 1/K; blank: 1.1e-5", 1e-4),
 )
 ADJUSTMENT = (

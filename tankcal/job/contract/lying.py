@@ -1,41 +1,16 @@
 """[horizontal] and [sphere]: their keys; sizes complete, consistent, and said once."""
 
-from tankcal.job.checking import is_not_given, missing_beside, tell
+from tankcal.job.checking import is_not_given, missing_beside, settings_place, tell
+from tankcal.job.contract.ends import HORIZONTAL_ONLY, check_end, end_keys
 from tankcal.job.contract.shorthand import choice, number, positive
+from tankcal.job.plausibility import STRONG_ROLL_DEG
 from tankcal.messages import message
 
-HORIZONTAL_ONLY = ("horizontal",)
 SPHERE_ONLY = ("sphere",)
-END_FORMS = ("flat", "conical", "ellipsoidal", "torispherical", "spherical")
 
 
 def _length(name, note, kinds, high=100.0, required=False):
     return positive(name, note, high, required=required, kinds=kinds)
-
-
-def _end(letter):
-    """The keys of one end of a horizontal cylinder."""
-    name = f"end {letter.upper()}"
-    return (
-        choice(f"end_{letter}", f"form of {name}", END_FORMS, required=True, kinds=HORIZONTAL_ONLY),
-        _length(
-            f"end_{letter}_depth_m",
-            f"{name}: depth along the axis, metres; conical, ellipsoidal, spherical only",
-            HORIZONTAL_ONLY,
-            20,
-        ),
-        _length(
-            f"end_{letter}_dish_radius_m",
-            f"{name}: radius of the dish, metres; torispherical only",
-            HORIZONTAL_ONLY,
-        ),
-        _length(
-            f"end_{letter}_knuckle_radius_m",
-            f"{name}: radius of the knuckle, metres; torispherical only",
-            HORIZONTAL_ONLY,
-            20,
-        ),
-    )
 
 
 def _thickness(kinds):
@@ -64,8 +39,8 @@ HORIZONTAL = (
         200,
         required=True,
     ),
-    *_end("a"),
-    *_end("b"),
+    *end_keys("a"),
+    *end_keys("b"),
     number(
         "tilt_mm_per_m",
         "rise of end B over end A, millimetres per metre of axis; negative: A is higher; blank: 0;"
@@ -76,8 +51,8 @@ HORIZONTAL = (
     ),
     number(
         "roll_deg",
-        "turn of an elliptical cross-section about the axis, degrees, clockwise seen from A;"
-        " blank: 0",
+        "turn of an elliptical cross-section, or of guppy ends, about the axis, degrees, clockwise"
+        " seen from A; blank: 0",
         -90,
         90,
         kinds=HORIZONTAL_ONLY,
@@ -96,6 +71,22 @@ HORIZONTAL = (
         ("plumb", "square"),
         kinds=HORIZONTAL_ONLY,
     ),
+    number(
+        "tube_angle_deg",
+        "gauge tube of a round tank that was rolled: its angle off the plumb, in the plane square"
+        " to the axis, degrees; above 0: its top leans to the right, seen from A; blank: 0",
+        -60,
+        60,
+        kinds=HORIZONTAL_ONLY,
+    ),
+    number(
+        "tube_offset_m",
+        "gauge tube of a round tank that does not cross the axis: the distance at which it passes,"
+        " metres; above 0: to the right, seen from A; blank: 0",
+        -10,
+        10,
+        kinds=HORIZONTAL_ONLY,
+    ),
     _thickness(HORIZONTAL_ONLY),
     number(
         "azimuth_deg",
@@ -107,17 +98,40 @@ HORIZONTAL = (
     ),
 )
 SPHERE = (
-    _length("diameter_m", "diameter, metres: FILL IN this, or the points", SPHERE_ONLY),
+    _length(
+        "diameter_m", "diameter, metres: FILL IN this, or the points, or great circles", SPHERE_ONLY
+    ),
     _thickness(SPHERE_ONLY),
+    number(
+        "ovality_mm",
+        "only with great_circles: standard deviation of how oval and how flat the sphere is, where"
+        " no strap tells it, millimetres; blank: 0.1 % of its radius",
+        0,
+        500,
+        above_low=True,
+        kinds=SPHERE_ONLY,
+    ),
+    number(
+        "form_mm",
+        "only with great_circles: standard deviation of its radius beyond the ellipsoid (plates,"
+        " seams, legs), millimetres; blank: 4.3",
+        0,
+        500,
+        kinds=SPHERE_ONLY,
+    ),
 )
 
 KEYS = {"horizontal": HORIZONTAL, "sphere": SPHERE}
 
 STRONG_TILT_MM_PER_M = 50
-DEEPEST_END = 2.0  # diameters
+ROUND_TUBE = message(
+    "tube_round_only", "expected only for a round cylinder: diameter_m, or points.csv"
+)
+RINGS_WITHOUT_TUBE = message(
+    "tube_beside_rings",
+    "cannot be given with rings.csv; expected a blank: dips of rings are taken through their axis",
+)
 SIZES = ("diameter_m", "width_m", "height_m")
-RADII = ("dish_radius_m", "knuckle_radius_m")
-ROUND_ONLY = ("torispherical", "spherical")
 
 
 def check_horizontal(values, wall, raw, log, height_m=None):
@@ -169,8 +183,10 @@ def check_horizontal(values, wall, raw, log, height_m=None):
                 ),
             )
     for end in ("end_a", "end_b"):
-        _check_end(given, end, wall is not None, raw, log)
+        check_end(given, end, wall is not None, raw, log)
     _check_dip(given, height_m, raw, log)
+    if wall != "straps":
+        _check_tube(given, has_points, raw, log)
 
 
 def _check_ringed(given, raw, log):
@@ -183,6 +199,9 @@ def _check_ringed(given, raw, log):
                 " are round, and have their sizes from these",
             )
             tell(log.problem, raw, "horizontal", key, expected)
+    for key in ("tube_angle_deg", "tube_offset_m"):
+        if given[key]:
+            tell(log.problem, raw, "horizontal", key, RINGS_WITHOUT_TUBE)
     curved = any(given[end] not in (None, "flat") for end in ("end_a", "end_b"))
     if curved and is_not_given(raw, "horizontal", "thickness_mm"):
         expected = message(
@@ -247,93 +266,6 @@ def _check_thickness(given, side, section, raw, log):
         tell(log.problem, raw, section, "thickness_mm", expected)
 
 
-def _check_end(given, end, has_points, raw, log):
-    def tell_problem(key, expected):
-        tell(log.problem, raw, "horizontal", key, expected)
-
-    form, depth = given[end], given[f"{end}_depth_m"]
-    height = given["height_m"] or given["diameter_m"]
-    width = given["width_m"] or given["diameter_m"]
-    if form is None:
-        return
-    if form in ROUND_ONLY and None not in (height, width) and height != width:
-        tell_problem(
-            end,
-            message(
-                "round_ends_only",
-                "found {form}; expected another form: this one is for round cylinders only",
-                form=form,
-            ),
-        )
-    needs_depth = form in ("conical", "ellipsoidal", "spherical")
-    if needs_depth and is_not_given(raw, "horizontal", f"{end}_depth_m"):
-        tell_problem(
-            f"{end}_depth_m",
-            message(
-                "end_depth_missing", "missing; expected the depth of the {form} end", form=form
-            ),
-        )
-    if depth is not None and not needs_depth:
-        expected = message(
-            "end_has_no_depth",
-            "given for a {form} end; expected a blank: such an end has no depth",
-            form=form,
-        )
-        if form == "torispherical":
-            expected = message(
-                "end_depth_from_radii",
-                "given for a {form} end; expected a blank: its radii determine it",
-                form=form,
-            )
-        tell_problem(f"{end}_depth_m", expected)
-    elif depth is not None and height is not None:
-        deepest = height / 2 if form == "spherical" else DEEPEST_END * height
-        if depth > deepest * (1 + 1e-9):
-            expected = message(
-                "end_too_deep",
-                "found {depth:g}; expected at most {deepest:g} m for a {form} end",
-                depth=depth,
-                deepest=deepest,
-                form=form,
-            )
-            tell_problem(f"{end}_depth_m", expected)
-    _check_radii(given, end, form, None if has_points else height, raw, log)
-
-
-def _check_radii(given, end, form, diameter, raw, log):
-    for radius in RADII:
-        key = f"{end}_{radius}"
-        if form == "torispherical" and is_not_given(raw, "horizontal", key):
-            expected = message("end_radius_missing", "missing; expected for a torispherical end")
-            tell(log.problem, raw, "horizontal", key, expected)
-        elif form != "torispherical" and given[key] is not None:
-            expected = message(
-                "end_radius_unused",
-                "given for a {form} end; expected only for a torispherical one",
-                form=form,
-            )
-            tell(log.problem, raw, "horizontal", key, expected)
-    dish, knuckle = (given[f"{end}_{radius}"] for radius in RADII)
-    if form != "torispherical" or None in (dish, knuckle, diameter):
-        return
-    if dish <= diameter / 2:
-        expected = message(
-            "dish_too_small",
-            "found {dish:g}; expected more than half the diameter, {half:g} m",
-            dish=dish,
-            half=diameter / 2,
-        )
-        tell(log.problem, raw, "horizontal", f"{end}_dish_radius_m", expected)
-    if knuckle > diameter / 2:
-        expected = message(
-            "knuckle_too_large",
-            "found {knuckle:g}; expected at most half the diameter, {half:g} m",
-            knuckle=knuckle,
-            half=diameter / 2,
-        )
-        tell(log.problem, raw, "horizontal", f"{end}_knuckle_radius_m", expected)
-
-
 def _check_dip(given, height_m, raw, log):
     dip, length, tilt = (given[key] for key in ("dip_from_a_m", "length_m", "tilt_mm_per_m"))
     height = given["height_m"] or given["diameter_m"] or height_m
@@ -357,7 +289,8 @@ def _check_dip(given, height_m, raw, log):
                     at_top=at_top,
                 )
             tell(log.problem, raw, "horizontal", "dip_from_a_m", expected)
-    if given["roll_deg"] and given["diameter_m"] is not None:
+    has_guppy = "guppy" in (given["end_a"], given["end_b"])
+    if given["roll_deg"] and given["diameter_m"] is not None and not has_guppy:
         expected = message("roll_of_round_tank", "it has no effect on a round cylinder")
         tell(log.warning, raw, "horizontal", "roll_deg", expected)
     if tilt and is_not_given(raw, "horizontal", "dip_from_a_m"):
@@ -374,17 +307,64 @@ def _check_dip(given, height_m, raw, log):
         tell(log.warning, raw, "horizontal", "tilt_mm_per_m", expected)
 
 
-def check_sphere(values, has_points, raw, log):
-    """The diameter, or points of the wall."""
+def _check_tube(given, has_points, raw, log):
+    """A gauge tube off the axis or off the plumb: across a round tank, and not plumb in a tilt."""
+    keys = [key for key in ("tube_angle_deg", "tube_offset_m") if given[key]]
+    diameter = given["diameter_m"]
+    for key in keys:
+        if None not in (given["width_m"], given["height_m"]):
+            tell(log.problem, raw, "horizontal", key, ROUND_TUBE)
+    if "tube_offset_m" in keys and diameter and abs(given["tube_offset_m"]) >= diameter / 2:
+        expected = message(
+            "tube_outside",
+            "found {offset:g}; expected a tube that crosses the tank: less than half the diameter,"
+            " {half:g} m",
+            offset=given["tube_offset_m"],
+            half=diameter / 2,
+        )
+        tell(log.problem, raw, "horizontal", "tube_offset_m", expected)
+    leans = has_points or given["tilt_mm_per_m"]
+    if "tube_angle_deg" in keys and leans and given["dip_direction"] != "square":
+        expected = message(
+            "tube_of_tilted_tank",
+            "expected square beside tube_angle_deg: a tube that leans in the plane square to the "
+            "axis of a tank that is tilted is not plumb",
+        )
+        tell(log.problem, raw, "horizontal", "dip_direction", expected)
+    if abs(given["tube_angle_deg"] or 0.0) > STRONG_ROLL_DEG:
+        expected = message(
+            "large_roll",
+            "{angle_deg:g} degrees is large; tanks roll by 1 to 10: is it the angle off the plumb?",
+            angle_deg=given["tube_angle_deg"],
+        )
+        tell(log.warning, raw, "horizontal", "tube_angle_deg", expected)
+
+
+def check_sphere(values, has_points, has_circles, is_loaded, raw, log):
+    """The diameter, points of the wall, or great circles; plates where something loads them."""
     given = values["sphere"]
-    _check_thickness(given, values["survey"]["side"], "sphere", raw, log)
+    if not is_loaded or values["survey"]["side"] == "outside":
+        _check_thickness(given, values["survey"]["side"], "sphere", raw, log)
+    if (
+        is_loaded
+        and not given["thickness_mm"]
+        and not log.has(*settings_place(raw, "sphere", "thickness_mm"))
+    ):
+        expected = message(
+            "thickness_of_loaded_sphere",
+            "missing or 0, but a pressure or a density is given; expected the plates, which give"
+            " way to it",
+        )
+        tell(log.problem, raw, "sphere", "thickness_mm", expected)
     if has_points:
         _refuse_given(given, ("diameter_m",), raw, log, "sphere")
-    elif is_not_given(raw, "sphere", "diameter_m"):
+    elif is_not_given(raw, "sphere", "diameter_m") and not has_circles:
         tell(
             log.problem,
             raw,
             "sphere",
             "diameter_m",
-            message("sphere_size_missing", "missing; expected it, or points.csv"),
+            message(
+                "sphere_size_missing", "missing; expected it, or points.csv, or great_circles.csv"
+            ),
         )

@@ -1,6 +1,6 @@
 """The keys of [mesh], [corrections], [checks] and [inspection]: most are for some kinds only."""
 
-from tankcal.job.contract.kinds import VERTICAL, WITH_POINTS
+from tankcal.job.contract.kinds import LOADED, VERTICAL, WITH_POINTS
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.fields import Field
 from tankcal.job.plausibility import DIAMETERS, SERVICES, SHELLS
@@ -34,9 +34,10 @@ CORRECTIONS = (
     _switch("plate", "subtract the plates from an outside survey", WITH_POINTS),
     _switch("paint", "subtract the paint from an outside survey", VERTICAL),
     _switch("temperature", "bring the shell to the reference temperature"),
-    _switch("head", "load the shell with the liquid head", VERTICAL),
+    _switch("head", "load the shell with the liquid head, a sphere with its pressure, too", LOADED),
     _switch("tilt", "take the tilt into account", ("vertical", "horizontal")),
     _switch("bottom", "take the form of the bottom into account", VERTICAL),
+    _switch("top", "take the head on top into account", VERTICAL),
     _switch("deadwood", "take the deadwood into account"),
     _switch("roof", "take the floating roof into account", VERTICAL),
 )

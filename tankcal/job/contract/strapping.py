@@ -25,6 +25,33 @@ def _number(name, note, low, high, required=False, above_low=False, kinds=()):
     return Field(name, "number", note, required=required, kinds=kinds, **bounds)
 
 
+def readings_by_tape(reading_note):
+    """Columns of what was read on a tape, and how, of any circumference."""
+    return (
+        _number("reading_m", reading_note, 0.3, 1000, required=True),
+        _number(
+            "s_mm", "standard deviation of one reading, millimetres", 0, 100, required=True,
+            above_low=True,
+        ),
+        _name("instrument", "tape of instruments.toml; blank: the only one there that is read"),
+        _number(
+            "temperature_c",
+            "temperature of the tape, degrees Celsius; blank: it lies on the shell and has its"
+            " temperature",
+            -60,
+            120,
+        ),
+        _number(
+            "tension_n",
+            "pull at the ends of the tape, newtons; of a tape without friction the mean round the"
+            " tank; blank: that of the certificate",
+            0,
+            1000,
+            above_low=True,
+        ),
+    )  # fmt: skip
+
+
 _COURSE = _name("course", "course of courses.csv", required=True, kinds=VERTICAL)
 _RING = _name("ring", "lying tank, in place of course: ring of rings.csv", True, LYING)
 CIRCUMFERENCES = (
@@ -39,39 +66,17 @@ CIRCUMFERENCES = (
         "from_a_m", "lying tank, in place of level_m: place of the tape along the axis from the"
         " start of the cylinder at A, metres", 0, 200, required=True, kinds=LYING,
     ),
-    _number(
-        "reading_m",
-        "reading of the tape round the tank, outside, metres",
-        0.3,
-        1000,
-        required=True,
-    ),
-    _number(
-        "s_mm", "standard deviation of one reading, millimetres", 0, 100, required=True,
-        above_low=True,
-    ),
-    _name("instrument", "tape of instruments.toml; blank: the only one there that is read"),
-    _number(
-        "temperature_c",
-        "temperature of the tape, degrees Celsius; blank: it lies on the shell and has its"
-        " temperature",
-        -60,
-        120,
-    ),
-    _number(
-        "tension_n",
-        "pull at the ends of the tape, newtons; of a tape without friction the mean round the"
-        " tank; blank: that of the certificate",
-        0,
-        1000,
-        above_low=True,
-    ),
+    *readings_by_tape("reading of the tape round the tank, outside, metres"),
     _number("pulls", "in how many pieces the tape was pulled round; blank: 1", 1, 50),
     USE,
     Field("note", "text", "for the reader"),
 )  # fmt: skip
 OBSTRUCTIONS = (
-    _name("circumference", "circumference of circumferences.csv that it is on", required=True),
+    _name(
+        "circumference",
+        "circumference of circumferences.csv, or circle of great_circles.csv, that it is on",
+        required=True,
+    ),
     Field(
         "kind",
         "choice",

@@ -1,11 +1,11 @@
 """uncertainty.csv: what it may declare, what is assumed without it, its columns and its checks."""
 
 from dataclasses import dataclass
-from math import degrees
+from math import degrees, pi
 
 from tankcal.gum.distributions import FAMILIES, expanded, within
 from tankcal.job.checking import refuse_repeated
-from tankcal.job.contract.kinds import KINDS, STRAPPED, VERTICAL, WITH_POINTS
+from tankcal.job.contract.kinds import KINDS, LOADED, STRAPPED, VERTICAL, WITH_POINTS
 from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.fields import Field
 from tankcal.messages import message
@@ -83,12 +83,27 @@ INPUTS = {
     ),
     "shell_temperature": Declarable("K", 1, 50, "shell temperature during the survey", default=2.0),
     "expansion": Declarable("1/K", 1, 1e-4, "coefficient of thermal expansion", default=1e-6),
-    "youngs_modulus": _of_shell("GPa", 1e-9, 100, "Young's modulus of the shell", default=6.0),
-    "liquid_density": _of_shell("kg/m3", 1, 500, "density of the liquid that the table is for"),
-    "survey_level": _of_shell(
-        "mm", 1e3, 1000, "level of the liquid on the survey day", default=5.0
+    "youngs_modulus": Declarable(
+        "GPa", 1e-9, 100, "Young's modulus of the shell", LOADED, default=6.0
     ),
-    "survey_density": _of_shell("kg/m3", 1, 500, "density of that liquid", default=5.0),
+    "liquid_density": Declarable(
+        "kg/m3", 1, 500, "density of the liquid that the table is for", LOADED
+    ),
+    "survey_level": Declarable(
+        "mm", 1e3, 1000, "level of the liquid on the survey day", LOADED, default=5.0
+    ),
+    "survey_density": Declarable("kg/m3", 1, 500, "density of that liquid", LOADED, default=5.0),
+    "pressure": Declarable(
+        "bar", 1e-5, 10, "gauge pressure in the sphere that the table is for", ("sphere",)
+    ),
+    "survey_pressure": Declarable(
+        "bar",
+        1e-5,
+        10,
+        "gauge pressure in the sphere on the survey day",
+        ("sphere",),
+        default=0.1,
+    ),
     "bottom": _of_shell(
         "mm", 1e3, 500, "height of the bottom's surface, the same error everywhere"
     ),
@@ -109,6 +124,24 @@ INPUTS = {
     ),
     "length": _of_lying("mm", 1e3, 500, "length of the horizontal cylinder"),
     "end_depth": _of_lying("mm", 1e3, 500, "depth of both ends, the same error"),
+    "dish": Declarable(
+        "mm",
+        1e3,
+        500,
+        "radius of the dish of torispherical ends and heads, where it is given, the same error",
+        ("vertical", "horizontal"),
+    ),
+    "knuckle": Declarable(
+        "mm",
+        1e3,
+        200,
+        "radius of the knuckle of torispherical ends and heads, where it is given, the same error",
+        ("vertical", "horizontal"),
+    ),
+    "bottom_depth": _of_shell(
+        "mm", 1e3, 500, "depth of a shaped bottom from its edge to its middle"
+    ),
+    "top_depth": _of_shell("mm", 1e3, 500, "rise of the head on top over the shell"),
     "tilt": Declarable(
         "mm/m",
         1e3,
@@ -127,6 +160,8 @@ INPUTS = {
         "how far the axis of each ring stands above the common one, independent of the others",
         correlates=False,
     ),
+    "tube_angle": _of_lying("deg", 180 / pi, 10, "angle of the gauge tube off the plumb"),
+    "tube_offset": _of_lying("mm", 1e3, 500, "place of the gauge tube across the axis"),
     "surface": Declarable("mm", 1e3, 200, "offset of the mesh's surface from the wall", ("mesh",)),
     "trim": _of_ship("mm", 1e3, 1000, "trim of a ship: draught aft less draught forward"),
     "list": _of_ship("deg", degrees(1), 5, "list of a ship"),

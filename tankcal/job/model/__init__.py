@@ -15,6 +15,7 @@ from tankcal.job.model.parts import (
     Roof,
     Ship,
     Sphere,
+    Top,
 )
 from tankcal.job.model.radii import Change, Radii
 from tankcal.job.model.settings import (
@@ -28,6 +29,7 @@ from tankcal.job.model.settings import (
     TableSpec,
     Tank,
 )
+from tankcal.survey.great_circles import GreatCircles
 from tankcal.survey.measurements import Measurements
 from tankcal.survey.points import Points
 from tankcal.survey.reference_line import ReferenceLines
@@ -63,6 +65,7 @@ __all__ = [
     "Switches",
     "TableSpec",
     "Tank",
+    "Top",
 ]
 
 
@@ -95,6 +98,8 @@ class Job:
         In the order of the file.
     roof : Roof or None
         None without a floating roof.
+    top : Top or None
+        Head on a vertical tank; None: its table ends with the shell.
     horizontal, sphere, mesh
         None for the other kinds of tank.
     ship : Ship or None
@@ -135,6 +140,8 @@ class Job:
         some courses.
     change : Change or None
         How they may have changed since then; beside a survey.
+    great_circles : GreatCircles or None
+        Equator and meridians of a sphere by tape, in place of points.
     """
 
     tank: Tank | None
@@ -175,3 +182,5 @@ class Job:
     radii: Radii | None = None
     change: Change | None = None
     rings: tuple[Ring, ...] = ()
+    great_circles: GreatCircles | None = None
+    top: Top | None = None

@@ -66,10 +66,11 @@ class Bottom:
     Attributes
     ----------
     form : str
-        "flat", "leaning" (square to the shell's axis), "cone", "dish", "points" (a surveyed
-        surface), "cloud" (the same, found in scans) or "liquid" (measured volumes).
+        "flat", "leaning" (square to the shell's axis), "cone", "dish", "ellipsoidal",
+        "torispherical", "points" (a surveyed surface), "cloud" (the same, found in scans) or
+        "liquid" (measured volumes).
     centre_z_m : float or None
-        Cone and dish: z of the centre in the survey's frame; the edge is at bottom_z_m.
+        Cone, dish and so on: z of the centre in the survey's frame; the edge is at bottom_z_m.
     xyz_m : ndarray, shape (n, 3)
         Points: surveyed, in the survey's frame; of a cloud None until its scans are read.
     sd_m : ndarray, shape (n,)
@@ -84,6 +85,10 @@ class Bottom:
         Row of each point or level in its file, for messages.
     shared : tuple of survey.results.Cause
         Cloud: what the heights of its points have in common; each has (n,) m.
+    dish_radius_m, knuckle_radius_m : float or None
+        Torispherical: where given; else None.
+    standard : str or None
+        Torispherical: what gives the radii by the diameter; else None.
     """
 
     form: str = "flat"
@@ -95,6 +100,32 @@ class Bottom:
     u_m3: np.ndarray | None = None
     rows: tuple = ()
     shared: tuple = ()
+    dish_radius_m: float | None = None
+    knuckle_radius_m: float | None = None
+    standard: str | None = None
+
+
+@dataclass(frozen=True)
+class Top:
+    """A head on the shell of a vertical tank, which liquid may rise into; sizes inside.
+
+    Attributes
+    ----------
+    form : str
+        "cone", "dish", "ellipsoidal" or "torispherical".
+    depth_m : float or None
+        Rise of its middle over the top of the shell; None: it follows from radii.
+    dish_radius_m, knuckle_radius_m : float or None
+        Torispherical: where given; else None.
+    standard : str or None
+        Torispherical: what gives the radii by the diameter; else None.
+    """
+
+    form: str
+    depth_m: float | None = None
+    dish_radius_m: float | None = None
+    knuckle_radius_m: float | None = None
+    standard: str | None = None
 
 
 @dataclass(frozen=True)
@@ -145,20 +176,26 @@ class End:
     Attributes
     ----------
     kind : str
-        "flat", "conical", "ellipsoidal", "torispherical" or "spherical".
+        "flat", "conical", "ellipsoidal", "torispherical", "spherical" or "guppy".
     depth_m : float
-        Along the axis, from the end of the cylinder; flat: 0; torispherical: 0, it follows from
-        the radii.
+        Along the axis, from the end of the cylinder; flat: 0; torispherical: 0 where it follows
+        from the radii.
     dish_radius_m : float or None
-        Torispherical: radius of the dish (crown); else None.
+        Torispherical: radius of the dish (crown), where given; else None.
     knuckle_radius_m : float or None
-        Torispherical: radius of the knuckle; else None.
+        Torispherical: radius of the knuckle, where given; else None.
+    standard : str or None
+        Torispherical: what gives the radii by the diameter; else None.
     """
 
     kind: str
     depth_m: float = 0.0
     dish_radius_m: float | None = None
     knuckle_radius_m: float | None = None
+    standard: str | None = field(
+        default=None,
+        metadata={"doc": "form that both radii follow from; left out if none", "optional": True},
+    )
 
 
 @dataclass(frozen=True)
@@ -184,6 +221,11 @@ class Horizontal:
         the ends.
     azimuth_rad : float or None
         Direction from A to B, clockwise from +y; None: no points.
+    tube_angle_rad : float or None
+        Of the gauge tube off the plumb, square to the axis; its top to the right, seen from A;
+        None: plumb.
+    tube_offset_m : float or None
+        Distance at which the tube passes the axis, to the right of it, seen from A; None: 0.
     """
 
     length_m: float
@@ -197,6 +239,14 @@ class Horizontal:
     dip_direction: str = "plumb"
     thickness_m: float = 0.0
     azimuth_rad: float | None = None
+    tube_angle_rad: float | None = field(
+        default=None,
+        metadata={"doc": "of the gauge tube off the plumb; left out if plumb", "optional": True},
+    )
+    tube_offset_m: float | None = field(
+        default=None,
+        metadata={"doc": "of the tube off the axis; left out if through it", "optional": True},
+    )
 
 
 @dataclass(frozen=True)
@@ -209,10 +259,16 @@ class Sphere:
         As measured, on the side of the survey; None: it comes from the points.
     thickness_m : float
         Plate and paint, to be subtracted from what was measured outside.
+    ovality_m : float or None
+        Standard deviation of its degree 2 where no strap tells it; None: a share of its radius.
+    form_m : float or None
+        Of its radius beyond that; None: as `geometry.field.places` assumes.
     """
 
     diameter_m: float | None
     thickness_m: float = 0.0
+    ovality_m: float | None = None
+    form_m: float | None = None
 
 
 @dataclass(frozen=True)

@@ -87,6 +87,8 @@ class Survey:
         "outside" or "inside": where points and sizes were measured.
     liquid_level_m : float or None
         Dip of the survey day, from the table's zero; None or 0: empty.
+    pressure_pa : float or None
+        Gauge pressure in a sphere on that day; None: none.
     """
 
     side: str
@@ -94,6 +96,7 @@ class Survey:
     shell_temperature_c: float | None = None
     liquid_level_m: float | None = None
     liquid_density_kg_m3: float | None = None
+    pressure_pa: float | None = field(default=None, metadata={"optional": True})
 
 
 @dataclass(frozen=True)
@@ -153,6 +156,8 @@ class TableSpec:
         Heights of the least deliveries to be reported; None: not given.
     monte_carlo : bool
         Whether the model is drawn from, too.
+    pressure_pa : float or None
+        Gauge pressure in a sphere that the table is for; None: none.
     """
 
     step_m: float | None
@@ -170,6 +175,7 @@ class TableSpec:
     fine_zones: tuple[tuple[float, float], ...] = ()
     max_interpolation_error_m3: float | None = None
     height_expansion: bool = False
+    pressure_pa: float | None = field(default=None, metadata={"optional": True})
 
 
 @dataclass(frozen=True)
@@ -194,7 +200,7 @@ class Switches:
 
     Attributes
     ----------
-    plate, paint, temperature, head, tilt, bottom, deadwood, roof : bool
+    plate, paint, temperature, head, tilt, bottom, deadwood, roof, top : bool
         False: that correction is not made.
     """
 
@@ -206,6 +212,9 @@ class Switches:
     bottom: bool = True
     deadwood: bool = True
     roof: bool = True
+    top: bool = field(
+        default=True, metadata={"doc": "take the head on top into account", "optional": True}
+    )
 
 
 @dataclass(frozen=True)
@@ -220,8 +229,11 @@ class Material:
         Thermal expansion, 1/K.
     expansion_given : bool
         False: the default was taken, and the report says so.
+    poisson : float or None
+        Poisson's ratio of the wall of a sphere; None: 0.3.
     """
 
     e_pa: float = 206e9
     expansion_per_k: float = 1.1e-5
     expansion_given: bool = False
+    poisson: float | None = field(default=None, metadata={"optional": True})

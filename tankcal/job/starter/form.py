@@ -9,7 +9,9 @@ from tankcal.job.contract import (
     REGISTER_KEYS,
     REGISTERS_OF_SURVEY,
     SURVEYS,
+    SURVEYS_OF_KIND,
     TABLES_OF_KIND,
+    tables_of_survey,
 )
 from tankcal.job.contract.radii import KEYS as OF_RADII
 from tankcal.job.contract.uncertainty import UNITS
@@ -17,12 +19,12 @@ from tankcal.job.fields import Field
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
 STRAPPED = ("strapping", "reference-line")  # surveys that are not adjusted as points
-OF_RINGS = "strapping"  # of them that of a lying tank, too
 METERED = "liquid"  # a survey of every kind of tank
 DECLARED = "radii"  # no survey, but what a former table, a record or somebody says
-OF_SHELLS = (*STRAPPED, "wall-hits", "tangents", DECLARED)  # surveys of upright tanks alone
+OF_SHELLS = (*STRAPPED, "wall-hits", "tangents", DECLARED)  # upright, or SURVEYS_OF_KIND
 STARTS_OF_STRAPPING = {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
 STARTS_OF_LIQUID = {"survey.side": "inside", "datum.bottom_z_m": "0.0"}  # of upright tanks
+OF_GREAT_CIRCLES = (("sphere", "ovality_mm"), ("sphere", "form_mm"))
 PLACEHOLDER = "NAME"  # of a camera or an instrument
 
 
@@ -43,9 +45,9 @@ class Form:
         if self.survey is not None:
             _refuse_others(self.survey, SURVEYS)
             has_none = "points" not in TABLES_OF_KIND[self.kind] and self.survey != METERED
-            is_ringed = self.survey == OF_RINGS and self.kind == "horizontal"
-            is_shell = self.kind == "vertical" or is_ringed
-            if has_none or (self.survey in OF_SHELLS and not is_shell):
+            of_other = self.survey in OF_SHELLS and self.kind != "vertical"
+            of_other &= self.survey not in SURVEYS_OF_KIND.get(self.kind, {})
+            if has_none or of_other:
                 raise ValueError(f"a tank of kind {self.kind} has no survey; expected another kind")
 
     @property
@@ -54,9 +56,10 @@ class Form:
         of_tank = TABLES_OF_KIND[self.kind]
         if self.survey is None:
             return of_tank
-        if self.survey == OF_RINGS and self.kind == "horizontal":
-            of_tank = ("rings", *of_tank)
-        return (*SURVEYS[self.survey], *(table for table in of_tank if table != "points"))
+        return (
+            *tables_of_survey(self.kind, self.survey),
+            *(table for table in of_tank if table != "points"),
+        )
 
     @property
     def registers(self):
@@ -87,6 +90,8 @@ class Form:
             return "outside"
         if self.survey in (METERED, DECLARED) and self.kind == "vertical":
             return STARTS_OF_LIQUID.get(f"{section}.{field.name}", field.start)
+        if self.survey in STRAPPED and self.kind == "sphere":
+            return field.start if (section, field.name) != ("survey", "side") else "outside"
         if self.survey in STRAPPED:
             return STARTS_OF_STRAPPING.get(f"{section}.{field.name}", field.start)
         return field.start
@@ -122,6 +127,8 @@ class Form:
         if field.of_survey and self.survey is None:
             return False
         if section in ("shell", "strapping") and self.survey not in STRAPPED:
+            return False
+        if (section, field.name) in OF_GREAT_CIRCLES and self.survey not in STRAPPED:
             return False
         if section.startswith("adjustment") and self.survey in (*STRAPPED, METERED, DECLARED):
             return False

@@ -29,6 +29,7 @@ _UNITS = {
     "_ppm": "ppm",
     "_gpa": "GPa",
     "_m3": "m³",
+    "_bar": "bar",
     "_mm2": "mm²",
     "_mm": "mm",
     "_um": "µm",
@@ -69,6 +70,7 @@ SECTION_NOTES = {
     "mesh": "the closed surface of the inside",
     "ship": "only of a tank of a ship: trims, lists and the sounding pipe; all of it, or nothing",
     "bottom": "what the bottom is like; see bottom.csv, too",
+    "top": "the head on top, which liquid may rise into; blank: the table ends with the shell",
     "roof": "the floating roof: all of it, or nothing when there is none",
     "corrections": "false switches a correction off, and the report says so",
     "material": "the shell's steel",
@@ -104,6 +106,7 @@ TABLE_NOTES = {
     "thickness": "one row for each reading of a gauge of plates; may stay empty",
     "tape_checks": "one row for each comparison of the working tape with its master; may stay"
     " empty",
+    "great_circles": "one row for each reading of the tape round the sphere: equator and meridians",
     "targets": "one row for each target of the wall; may stay empty: the wall is then searched",
     "photos": "one row for each photo; orientations may stay blank, they are found",
     "image_points": "one row for each image of a point; a repeated row is a repeated reading",

@@ -14,6 +14,7 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.pipeline.tanks import body_of
+from tankcal.tank.heads import RADII
 from tankcal.tank.parts import sum_derivatives
 
 # A job with one of its inputs moved: what the volume does then is its own answer, not a slope.
@@ -32,6 +33,14 @@ VARIED = (
     "end_depth",
     "tilt",
     "dip_position",
+    "pressure",
+    "survey_pressure",
+    "dish",
+    "knuckle",
+    "tube_angle",
+    "tube_offset",
+    "bottom_depth",
+    "top_depth",
 )
 
 
@@ -49,6 +58,8 @@ def vary_input(job, name, change):
         rings = tuple(replace(one, **{key: getattr(one, key) + change}) for one in job.rings)
         moved = replace(job, rings=rings)
         return moved if name == "paint" else _of_solid(moved, name, change)
+    if job.tank.kind == "vertical":
+        return _of_heads(job, name, change)
     if job.points is not None:
         return None if name != "plate_thickness" else _of_solid(job, name, change)
     return _of_solid(job, name, change)
@@ -61,7 +72,31 @@ _OF_VALUES = {
     "liquid_density": ("table", "liquid_density_kg_m3"),
     "survey_level": ("survey", "liquid_level_m"),
     "survey_density": ("survey", "liquid_density_kg_m3"),
+    "pressure": ("table", "pressure_pa"),
+    "survey_pressure": ("survey", "pressure_pa"),
 }
+
+
+def _of_heads(job, name, change):
+    """The job with another size of its bottom, of the head on top, or of both; None: no such."""
+    bottom, top = job.bottom, job.top
+    if name == "bottom_depth" and bottom.centre_z_m is not None:
+        down = bottom.centre_z_m < job.datum.bottom_z_m
+        return _with(job, "bottom", "centre_z_m", -change if down else change)
+    if name == "top_depth" and top is not None and top.depth_m:
+        return _with(job, "top", "depth_m", change)
+    if name not in RADII:
+        return None
+    key = _OF_ENDS[name]
+    sized = {
+        part: replace(head, **{key: getattr(head, key) + change})
+        for part, head in (("bottom", bottom), ("top", top))
+        if head is not None and getattr(head, key)
+    }
+    return replace(job, **sized) if sized else None
+
+
+_ABSENT = ("tube_angle_rad", "tube_offset_m")  # where they were not given they are 0
 
 
 def _of_solid(job, name, change):
@@ -74,10 +109,12 @@ def _of_solid(job, name, change):
     if name == "diameter":
         wider = replace(lying, width_m=lying.width_m + change, height_m=lying.height_m + change)
         return replace(job, horizontal=wider)
-    if name == "end_depth":
-        ends = {key: _deeper(getattr(lying, key), change) for key in ("end_a", "end_b")}
+    if name in _OF_ENDS:
+        ends = {key: _varied(getattr(lying, key), name, change) for key in ("end_a", "end_b")}
         return None if None in ends.values() else replace(job, horizontal=replace(lying, **ends))
     keys = {
+        "tube_angle": "tube_angle_rad",
+        "tube_offset": "tube_offset_m",
         "plate_thickness": "thickness_m",
         "length": "length_m",
         "tilt": "tilt",
@@ -86,18 +123,27 @@ def _of_solid(job, name, change):
     return _with(job, "horizontal", keys[name], change) if name in keys else None
 
 
-def _deeper(end, change):
-    """The end with another depth; None for a torispherical one, whose radii give its depth."""
-    if end.kind == "flat":
-        return end
-    return replace(end, depth_m=end.depth_m + change) if end.depth_m else None
+_OF_ENDS = {
+    "end_depth": "depth_m",
+    "dish": "dish_radius_m",
+    "knuckle": "knuckle_radius_m",
+}
+
+
+def _varied(end, name, change):
+    """The end with another size; None for the depth of a torispherical one that radii give."""
+    key = _OF_ENDS[name]
+    size = getattr(end, key)
+    if size:
+        return replace(end, **{key: size + change})
+    return None if end.kind == "torispherical" and name == "end_depth" else end
 
 
 def _with(job, part, key, change):
     whole = getattr(job, part)
-    if getattr(whole, key) is None:
+    if getattr(whole, key) is None and key not in _ABSENT:
         return None
-    return replace(job, **{part: replace(whole, **{key: getattr(whole, key) + change})})
+    return replace(job, **{part: replace(whole, **{key: (getattr(whole, key) or 0.0) + change})})
 
 
 PICKED, FROM_EMPTY = 400, 40  # rows that curvatures are computed at; of them next to the empty tank
@@ -144,7 +190,8 @@ def _of_input(job, survey, body, levels_m, picked, name, declared):
     if name == "scale":
         return _of_scale(body, levels_m, declared) if body.shell is not None else {}
     if name == "tilt" and body.shell is not None:
-        return {"tilt": body.shell.volume_m3(levels_m) * declared["tilt"] ** 2}
+        in_shell = np.minimum(levels_m, body.shell.volume.height_m)
+        return {"tilt": body.shell.volume_m3(in_shell) * declared["tilt"] ** 2}
     if name not in VARIED:
         return {}
     for share in STEPS:

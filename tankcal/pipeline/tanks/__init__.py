@@ -1,7 +1,13 @@
 """From a checked job to the body of its tank: every part, with the corrections that are on."""
 
 from tankcal.pipeline.tanks.common import as_declared, thermal_scale
-from tankcal.pipeline.tanks.solid import ship_pipe, sized_job, solid_body, solid_zero
+from tankcal.pipeline.tanks.solid import (
+    pressure_of,
+    ship_pipe,
+    sized_job,
+    solid_body,
+    solid_zero,
+)
 from tankcal.pipeline.tanks.vertical import (
     critical_zone,
     insets_of,
@@ -16,6 +22,7 @@ __all__ = [
     "critical_zone",
     "heeled_body",
     "insets_of",
+    "pressure_of",
     "shell_volume",
     "ship_pipe",
     "sized_job",

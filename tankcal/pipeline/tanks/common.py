@@ -2,8 +2,10 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from tankcal.tank.fittings import deadwood
-from tankcal.tank.heads import End
+from tankcal.tank.heads import End, standard_end
 
 LEARNED, HALF_LEARNED = 0.1, 0.5  # share of a variance's logarithm that is assumed, at most
 
@@ -36,8 +38,27 @@ def estimates_of(job):
         "roof_mass": job.roof and job.roof.mass_kg,
         **_of_solid(job),
         **_of_ship(job),
+        **_of_heads(job),
     }
     return {name: value for name, value in given.items() if value is not None}
+
+
+def _of_heads(job):
+    """Sizes of the bottom of an upright tank, and of the head on it, as they were given."""
+    if job.tank.kind != "vertical":
+        return {}
+    centre, top = job.bottom.centre_z_m, job.top
+    heads = [one for one in (job.bottom, top) if one is not None]
+    dishes, knuckles = (
+        [1000 * getattr(one, key) for one in heads if getattr(one, key)]
+        for key in ("dish_radius_m", "knuckle_radius_m")
+    )
+    return {
+        "bottom_depth": None if centre is None else 1000 * abs(centre - job.datum.bottom_z_m),
+        "top_depth": top and _thousand(top.depth_m),
+        "dish": _only(dishes),
+        "knuckle": _only(knuckles),
+    }
 
 
 def _of_solid(job):
@@ -49,14 +70,22 @@ def _of_solid(job):
     if lying is None:
         return {**plate, "diameter": _thousand(solid.diameter_m)}
     round_m = lying.width_m if lying.width_m == lying.height_m else None
-    depths = [end.depth_m for end in (lying.end_a, lying.end_b) if end.depth_m]
+    ends = (lying.end_a, lying.end_b)
+    depths, dishes, knuckles = (
+        [1000 * getattr(end, key) for end in ends if getattr(end, key)]
+        for key in ("depth_m", "dish_radius_m", "knuckle_radius_m")
+    )
     return {
         **plate,
         "diameter": _thousand(round_m),
         "length": _thousand(lying.length_m),
-        "end_depth": _only([1000 * depth for depth in depths]),
+        "end_depth": _only(depths),
+        "dish": _only(dishes),
+        "knuckle": _only(knuckles),
         "tilt": _thousand(lying.tilt),
         "dip_position": _thousand(lying.dip_from_a_m),
+        "tube_angle": lying.tube_angle_rad and float(np.degrees(lying.tube_angle_rad)),
+        "tube_offset": _thousand(lying.tube_offset_m),
     }
 
 
@@ -123,7 +152,10 @@ def is_warmed(job, switches):
     return switches.temperature and job.survey.shell_temperature_c is not None
 
 
-def inside_end(end, plate_m, scale):
-    """The inside of an end; the depth of a torispherical one follows from its radii."""
-    lengths = (end.depth_m, end.dish_radius_m, end.knuckle_radius_m)
+def inside_end(end, diameter_m, plate_m, scale):
+    """The inside of an end, from what was measured; radii of a standard follow the diameter."""
+    measured = End(end.kind, end.depth_m, end.dish_radius_m, end.knuckle_radius_m)
+    if end.standard is not None:
+        measured = standard_end(measured, end.standard, diameter_m)
+    lengths = (measured.depth_m, measured.dish_radius_m, measured.knuckle_radius_m)
     return End(end.kind, *(scale * (length - plate_m) if length else length for length in lengths))

@@ -16,8 +16,8 @@ def ringed_part(job, wall, switches):
     tank = RingedTank(
         tuple(float(scale * radius) for radius in radii),
         tuple(scale * one.length_m for one in job.rings),
-        end_a=inside_end(lying.end_a, ends_m, scale),
-        end_b=inside_end(lying.end_b, ends_m, scale),
+        end_a=inside_end(lying.end_a, 2 * float(wall.radius_m[0]), ends_m, scale),
+        end_b=inside_end(lying.end_b, 2 * float(wall.radius_m[-1]), ends_m, scale),
         tilt=lying.tilt,
         dip_from_a_m=scale * lying.dip_from_a_m,
         dip_direction=lying.dip_direction,

@@ -14,9 +14,12 @@ from tankcal.pipeline.tanks.common import (
 )
 from tankcal.pipeline.tanks.rings import ringed_part
 from tankcal.tank.body import Body, SolidPart
+from tankcal.tank.ellipsoids import Membrane, PressedSphere, Pressure
 from tankcal.tank.meshes import mesh_part
 from tankcal.tank.ships import Pipe, in_ship_frame, piped_mesh
 from tankcal.tank.solids import LyingTank, Sphere
+
+POISSON = 0.3  # of steel
 
 
 def solid_body(job, survey, switches, heel=(0.0, 0.0)):
@@ -43,19 +46,31 @@ def _part(job, survey, switches, heel):
     plate = 0.0
     if given and job.survey.side == "outside" and switches.plate:
         plate = given.thickness_m
-    if job.sphere is not None:
+    unused, survey_says = () if plate else ("plate_thickness",), {}
+    if job.great_circles is not None:
+        solid = survey.solid(plate, scale)
+        survey_says, unused = _of_circles(survey, plate, scale), (*unused, "offset")
+    elif job.sphere is not None:
         solid = Sphere((job.sphere.diameter_m - 2 * plate) * scale)
     elif job.horizontal is not None:
         solid = _lying(job.horizontal, plate, scale)
     else:
         solid = _of_mesh(job, survey, scale, heel)
+    if job.points is not None:
+        survey_says = _of_scan(survey, scale)
+    pressure = pressure_of(job)
+    if switches.head and pressure.is_there and job.sphere.thickness_m:  # else nobody said how stiff
+        solid = PressedSphere(solid, _membrane(job), pressure)
+        unused = tuple(name for name in unused if name != "plate_thickness")
+        given = {"pressure": pressure.gas_pa, "survey_pressure": pressure.survey_gas_pa}
+        unused += tuple(name for name, pascals in given.items() if not pascals)
     return SolidPart(
         solid,
         scale,
         job.material.expansion_per_k,
         warmed=is_warmed(job, switches),
-        **(_of_scan(survey, scale) if job.points is not None else {}),
-        unused=() if plate else ("plate_thickness",),
+        **survey_says,
+        unused=unused,
     )
 
 
@@ -86,13 +101,17 @@ def solid_zero(job):
 
 
 def solid_as_surveyed(job, names, values):
-    """The lying tank or sphere inside the plates, of sizes that points gave, at their warmth."""
+    """The lying tank or sphere inside the plates, of sizes that points gave, at their warmth.
+
+    Its dips are plumb ones through the axis, whatever tube the table is for.
+    """
     sized = _with_sizes(job, names, values)
     given = sized.horizontal or sized.sphere
     plate = given.thickness_m if job.survey.side == "outside" and job.switches.plate else 0.0
     if sized.sphere is not None:
         return Sphere(sized.sphere.diameter_m - 2 * plate)
-    return _lying(sized.horizontal, plate, 1.0)
+    by_depth = replace(sized.horizontal, tube_angle_rad=None, tube_offset_m=None)
+    return _lying(by_depth, plate, 1.0)
 
 
 def sized_job(job, scan):
@@ -113,6 +132,37 @@ def _of_scan(scan, scale):
     """What the survey gives, as arguments of `SolidPart`; volumes are to scale."""
     factors = tuple(replace(one, columns=scale**3 * one.columns) for one in scan.form.factors)
     return {"surveyed": scan.names, "form": replace(scan.form, factors=factors)}
+
+
+def _of_circles(sphere, plate_m, scale):
+    """What great circles give, as arguments of `SolidPart`; volumes are to scale."""
+    form, read_with = sphere.part_of_volumes(plate_m)
+    factors = tuple(replace(one, columns=scale**3 * one.columns) for one in form.factors)
+    return {
+        "surveyed": ("diameter",),
+        "form": replace(form, factors=factors),
+        "read_with": {name: scale**3 * column for name, column in read_with.items()},
+    }
+
+
+def pressure_of(job):
+    """`Pressure` of a sphere: of its table and of its survey; of another tank none."""
+    if job.sphere is None:
+        return Pressure()
+    table, survey = job.table, job.survey
+    return Pressure(
+        gas_pa=table.pressure_pa or 0.0,
+        density_kg_m3=table.liquid_density_kg_m3,
+        survey_gas_pa=survey.pressure_pa or 0.0,
+        survey_density_kg_m3=survey.liquid_density_kg_m3 or 0.0,
+        survey_level_m=(survey.liquid_level_m or 0.0) + solid_zero(job),
+    )
+
+
+def _membrane(job):
+    given = job.material.poisson
+    ratio = POISSON if given is None else given
+    return Membrane(job.sphere.thickness_m, job.material.e_pa, ratio)
 
 
 def _of_mesh(job, mesh, scale, heel):
@@ -150,10 +200,12 @@ def _lying(tank, plate_m, scale):
         width_m=scale * (tank.width_m - 2 * plate_m),
         height_m=scale * (tank.height_m - 2 * plate_m),
         length_m=scale * tank.length_m,
-        end_a=inside_end(tank.end_a, plate_m, scale),
-        end_b=inside_end(tank.end_b, plate_m, scale),
+        end_a=inside_end(tank.end_a, tank.width_m, plate_m, scale),
+        end_b=inside_end(tank.end_b, tank.width_m, plate_m, scale),
         tilt=tank.tilt,
         roll_rad=tank.roll_rad,
         dip_from_a_m=scale * tank.dip_from_a_m,
         dip_direction=tank.dip_direction,
+        tube_angle_rad=tank.tube_angle_rad or 0.0,
+        tube_offset_m=scale * (tank.tube_offset_m or 0.0),
     )

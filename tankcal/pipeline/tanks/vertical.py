@@ -21,10 +21,14 @@ from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
 from tankcal.tank.courses import DEPARTURES, CourseShape
 from tankcal.tank.factors import Factor, cause_factors
 from tankcal.tank.fittings import floating_roof
+from tankcal.tank.heads import End, standard_end
 from tankcal.tank.hydrostatics import liquid_head
 from tankcal.tank.liquid_zone import Above, measured_bottom
 from tankcal.tank.parts import Part
 from tankcal.tank.terrain import Footprint
+from tankcal.tank.tips import FORMS as TIPS
+from tankcal.tank.tips import tip_of
+from tankcal.tank.tops import HeadedShell
 from tankcal.tank.volumes import ShellVolume
 from tankcal.uncertainty import factor_of
 
@@ -161,9 +165,13 @@ def vertical_body(job, wall, switches, uncertain):
     job = as_declared(job)
     shell = _shell(job, wall, switches, uncertain)
     zero = shell_zero(job, wall)
-    parts = [shell]
+    whole = shell
+    if switches.top and job.top is not None:
+        whole = HeadedShell(shell, _tip(job.top, shell))
+    highest = whole.highest_m if whole is not shell else shell.volume.height_m
+    parts = [whole]
     if switches.head and (job.table.liquid_density_kg_m3 or job.survey.liquid_density_kg_m3):
-        parts.append(_head(job, shell, zero))
+        parts.append(_head(job, shell, zero, highest))
     if switches.deadwood and job.deadwood:
         parts.append(deadwood_part(job.deadwood, zero))
     if switches.roof and job.roof is not None:
@@ -174,7 +182,7 @@ def vertical_body(job, wall, switches, uncertain):
         tuple(parts),
         job.inputs,
         lowest_m=min(part.lowest_m for part in parts),
-        highest_m=shell.volume.height_m,
+        highest_m=highest,
         correlations=job.correlations,
         estimates=estimates_of(job),
         shell=shell,
@@ -200,7 +208,9 @@ def _bottom(job, wall, shell):
         causes = bottom.shared if bottom.form == OF_CLOUD else None
         shared = causes and cause_factors(causes, [one.column_m for one in causes])
         return surveyed_bottom(footprint, xyz, bottom.sd_m, wall.shell.slope, shared)
-    return shaped_bottom(bottom.form, footprint.area_m2, bottom.centre_z_m - low)
+    rise = 0.0 if bottom.centre_z_m is None else bottom.centre_z_m - low
+    depth, *radii = _sizes_of_head(bottom, footprint.area_m2, abs(rise))
+    return shaped_bottom(bottom.form, footprint.area_m2, np.copysign(depth, rise), *radii)
 
 
 def _footprint(wall, shell):
@@ -213,7 +223,7 @@ def _footprint(wall, shell):
     return Footprint(float(x), float(y), radius * np.sqrt(larger))
 
 
-def _head(job, shell, zero):
+def _head(job, shell, zero, highest_m):
     survey = job.survey
     return liquid_head(
         shell.volume,
@@ -223,7 +233,24 @@ def _head(job, shell, zero):
         survey_density_kg_m3=survey.liquid_density_kg_m3 or 0.0,
         survey_level_m=_survey_level_m(survey, zero),
         scale=shell.scale,
+        headroom_m=highest_m - shell.volume.height_m,
     )
+
+
+def _tip(top, shell):
+    """The head on the shell, as high as heights are at the table's temperature."""
+    volume = shell.volume
+    plan = float(volume.top_weights @ volume.features)
+    sizes = _sizes_of_head(top, plan, top.depth_m)
+    return tip_of(top.form, plan, *(shell.stretch * one if one else one for one in sizes))
+
+
+def _sizes_of_head(head, plan_m2, depth_m):
+    """(depth, dish, knuckle) of a head; radii of a standard follow the diameter of its edge."""
+    end = End(TIPS[head.form], depth_m or 0.0, head.dish_radius_m, head.knuckle_radius_m)
+    if head.standard is not None:
+        end = standard_end(end, head.standard, 2 * np.sqrt(plan_m2 / np.pi))
+    return end.depth_m, end.dish_radius_m, end.knuckle_radius_m
 
 
 def _survey_level_m(survey, zero):

@@ -125,8 +125,8 @@ def _results(parent, tongues):
         of = _result(parent, "courses", tongues.word("headings.courses"))
         for course in record["courses"]:
             _course(of, tongues, course)
-    for name in ("solid", "bottom", "roof"):
-        if record[name]:
+    for name in ("solid", "bottom", "top", "roof"):
+        if record.get(name):
             _described(parent, tongues, name)
     if record["deadwood"]:
         of = _result(parent, "deadwood", tongues.word("captions.deadwood"))

@@ -4,7 +4,17 @@ import numpy as np
 
 from tankcal.job.covariance import MAX_POINTS
 from tankcal.report.outputs.csv_files import write_table
-from tankcal.report.tables import capacity, lines, liquid, readings, ship, strapping, survey, tank
+from tankcal.report.tables import (
+    capacity,
+    great_circles,
+    lines,
+    liquid,
+    readings,
+    ship,
+    strapping,
+    survey,
+    tank,
+)
 from tankcal.text.digits import PROGRAM, decimals_of_rows, fixed
 
 LEAST_DECIMALS = 6  # micrometres, square millimetres, millilitres
@@ -13,6 +23,7 @@ FILES = (
     "points_cov.npz",
     "sections.csv",
     "strapping.csv",
+    "great_circles.csv",
     "offsets.csv",
     "liquid_steps.csv",
     "capacity.csv",
@@ -29,6 +40,8 @@ def write_tables(record, directory):
     tables = {"points": (survey.POINTS, None), "sections": (tank.SECTIONS, None)}
     if record.get("strapping"):
         tables["strapping"] = strapping.straps_of(record), None
+    if record.get("great_circles"):
+        tables["great_circles"] = great_circles.CIRCLES, None
     if record.get("lines"):
         tables["offsets"] = lines.OFFSETS, None
     if record.get("liquid"):

@@ -115,6 +115,7 @@ def _references(record):
             "reference_temperature": job["table"]["reference_temperature_c"],
             "expansion": job["material"]["expansion_per_k"],
             "table_density": job["table"]["liquid_density_kg_m3"] or None,
+            "table_pressure": job["table"].get("pressure_pa"),
         }
     ]
 
@@ -129,10 +130,11 @@ REFERENCES = Table(
                in_sheet={"digits": None, "decimals": 1}),
         Column("expansion", text=_expansion, on=CERTIFICATE),
         Column("table_density", "kg/m3", digits=4, on=BOTH),
+        Column("table_pressure", "bar", digits=4, on=BOTH),
     ),
     rows=_references,
     last={
-        FIELD_TABLE: "dip_point reference_temperature table_density",
+        FIELD_TABLE: "dip_point reference_temperature table_density table_pressure",
         "sheet": "zero reference_height",
     },
 )  # fmt: skip
@@ -155,6 +157,7 @@ def _survey(record):
             "shell_temperature": survey["shell_temperature_c"],
             "liquid_level": survey["liquid_level_m"],
             "liquid_density": survey["liquid_density_kg_m3"],
+            "survey_pressure": survey.get("pressure_pa"),
         }
     ]
 
@@ -178,6 +181,7 @@ SURVEY = Table(
                in_sheet={"digits": None, "decimals": 1}),
         Column("liquid_level", "m", decimals=3),
         Column("liquid_density", "kg/m3", digits=4),
+        Column("survey_pressure", "bar", digits=4),
     ),
     rows=_survey,
 )  # fmt: skip

@@ -12,7 +12,8 @@ USEFUL = 0.995  # of U: an input that would change it less is not worth measurin
 UNLIMITED = "∞"  # degrees of freedom
 LEAST_WRITTEN_OUT = 1e-4  # of a sensitivity in the workbook
 SMALL = 5e-4  # share of the variance that prints as 0.0 %
-OF_WALL = ("bulge", "ovality", "seams")  # inputs whose note is a code: how their size is known
+# inputs whose note is a code: how their size is known
+OF_WALL = ("bulge", "ovality", "seams", "oblateness", "legs")
 
 
 def top(paper):

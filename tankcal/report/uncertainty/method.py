@@ -29,6 +29,8 @@ FROM_SURVEY = (
     "bulge",
     "ovality",
     "seams",
+    "oblateness",
+    "legs",
     "undecided",
     "form",
     "own_form",

@@ -25,13 +25,19 @@ def tank_view(paper):
     found = {"shell": None, "solid": None, "reason": ""}
     if record["sections"]:
         found["shell"] = shell_of(record)
-    elif kind in _PROFILES and record["solid"]:
+    elif kind in _PROFILES and record["solid"] and not _is_oblique(record["solid"]):
         found["solid"] = _PROFILES[kind]({one["code"]: one["value"] for one in record["solid"]})
     else:
         drawing = "no_view_of_drawing" if kind == "vertical" else "no_view"
         code = "no_view_of_straps" if record.get("strapping") else drawing
+        code = "no_view_of_guppy" if kind == "horizontal" else code
         found["reason"] = paper.word(f"web.{code}")
     return Block({"kind": "tank_view", "text": paper.word("web.view_here"), **found})
+
+
+def _is_oblique(solid):
+    """Whether an end is no solid of revolution, which is all that the view can turn."""
+    return any(one["code"] in ("end_a", "end_b") and one["value"] == "guppy" for one in solid)
 
 
 def shell_of(record):

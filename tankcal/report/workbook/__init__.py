@@ -13,6 +13,7 @@ from tankcal.report.workbook.papers import (
     clouds_sheet,
     corrections_sheet,
     courses_sheet,
+    great_circles_sheet,
     hits_sheet,
     lines_sheet,
     liquid_sheet,
@@ -54,6 +55,7 @@ _SHOWN_OF_TANK = (
 )
 _OF_SURVEYS = {  # sheets of what a wall was surveyed with, by the part of the record
     "strapping": strapping_sheet,
+    "great_circles": great_circles_sheet,
     "lines": lines_sheet,
     "hits": hits_sheet,
     "tangents": tangents_sheet,

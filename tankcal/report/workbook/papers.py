@@ -2,6 +2,7 @@
 
 from tankcal.report.tables import (
     clouds,
+    great_circles,
     hits,
     lines,
     liquid,
@@ -39,6 +40,17 @@ def strapping_sheet(book, record):
         (book.word("headings.strapped_courses"), "strapped_courses",
          columns_of(book, strapping.strapped_courses_of(record))),
         (book.word("headings.tapes"), "tapes", columns_of(book, strapping.TAPES)),
+    ]  # fmt: skip
+    write_tables(book, sheet, _HEAD_ROW, tables)
+
+
+def great_circles_sheet(book, record):
+    """Every reading of a tape round a sphere with its corrections, and the tapes."""
+    sheet = book.sheet("great_circles", book.word("texts.circles_subtitle"), landscape=True)
+    tables = [
+        (book.word("headings.great_circles"), "great_circles",
+         columns_of(book, great_circles.CIRCLES)),
+        (book.word("headings.tapes"), "tapes", columns_of(book, great_circles.TAPES_OF_SPHERE)),
     ]  # fmt: skip
     write_tables(book, sheet, _HEAD_ROW, tables)
 

@@ -73,8 +73,8 @@ def inside_sheet(book, record):
     row = _HEAD_ROW
     if record["solid"]:
         row = _described(book, sheet, row, book.words["headings"]["dimensions"], record["solid"])
-    for code in ("deadwood", "bottom", "roof"):
-        said, declared = paper.choices(code), record[code]
+    for code in ("deadwood", "bottom", "top", "roof"):
+        said, declared = paper.choices(code), record.get(code)
         if not (said or declared):
             continue
         title = corrections[code]

@@ -24,6 +24,7 @@ from tankcal.job.plausibility import (
     side_doubt,
 )
 from tankcal.messages import message
+from tankcal.tank.tips import FORMS as HEADS
 
 # Level rings of points against the joints of the courses.
 
@@ -73,7 +74,9 @@ def _rings(z):
 
 
 RADII = (("dish_radius_m", DISH_RADIUS), ("knuckle_radius_m", KNUCKLE_RADIUS))
-ALIKE = dict.fromkeys(END_DEPTH, ("depth_m",)) | {"torispherical": [name for name, _ in RADII]}
+ALIKE = dict.fromkeys(END_DEPTH, ("depth_m",)) | {
+    "torispherical": ("depth_m", *(name for name, _ in RADII))
+}
 
 
 def check_sizes(values, kind, raw, log):
@@ -84,6 +87,8 @@ def check_sizes(values, kind, raw, log):
         _check_sphere(values, raw, log)
     if kind == "horizontal":
         _check_lying(values, raw, log)
+    if kind == "vertical":
+        _check_top(values, raw, log)
 
 
 def _check_inside(values, kind, raw, log):
@@ -176,22 +181,8 @@ def _check_length(length, diameter, raw, log):
 
 def _check_end(given, end, diameter, raw, log):
     form, key = given[f"end_{end}"], f"end_{end}_depth_m"
-    depth = given[key]
-    if form in END_DEPTH and depth is not None:
-        (least, most), ratio = END_DEPTH[form], depth / diameter
-        is_hemisphere = form == "spherical" and ratio >= HEMISPHERE
-        if not least <= ratio <= most and not is_hemisphere:
-            text = message(
-                "end_depth_strange",
-                "{found_m:g} m is {ratio:.3g} diameters, expected {least:g} to {most:g} for a"
-                " {form} end: is it the depth, and of one end?",
-                found_m=depth,
-                ratio=ratio,
-                least=least,
-                most=most,
-                form=form,
-            )
-            tell(log.warning, raw, "horizontal", key, text)
+    if form in END_DEPTH and given[key] is not None:
+        _check_depth("horizontal", key, given[key], form, diameter, raw, log)
     for name, (least, most) in RADII:
         radius = given[f"end_{end}_{name}"]
         if form == "torispherical" and radius is not None and not (
@@ -207,6 +198,31 @@ def _check_end(given, end, diameter, raw, log):
                 most=most,
             )
             tell(log.warning, raw, "horizontal", f"end_{end}_{name}", text)
+
+
+def _check_top(values, raw, log):
+    """The head on an upright tank."""
+    form, depth = values["top"]["form"], values["top"]["depth_m"]
+    diameter = values["tank"]["nominal_diameter_m"]
+    if None not in (form, depth, diameter):
+        _check_depth("top", "depth_m", depth, HEADS[form], diameter, raw, log)
+
+
+def _check_depth(section, key, depth, form, diameter, raw, log):
+    (least, most), ratio = END_DEPTH[form], depth / diameter
+    is_hemisphere = form == "spherical" and ratio >= HEMISPHERE
+    if not least <= ratio <= most and not is_hemisphere:
+        text = message(
+            "end_depth_strange",
+            "{found_m:g} m is {ratio:.3g} diameters, expected {least:g} to {most:g} for a"
+            " {form} end: is it the depth, and of one end?",
+            found_m=depth,
+            ratio=ratio,
+            least=least,
+            most=most,
+            form=form,
+        )
+        tell(log.warning, raw, section, key, text)
 
 
 def _check_alike(given, sizes, raw, log):

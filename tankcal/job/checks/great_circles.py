@@ -1,0 +1,139 @@
+"""Does a strapping of a sphere make sense as a whole: circles, tapes, obstructions, settings?"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tankcal.job.checking import UNIT_FACTOR, tell
+from tankcal.job.checks.extent import has_great_circles, has_wall_points, is_metered
+from tankcal.job.checks.strapping import (
+    MOST_STRAPS,
+    check_readings,
+    check_tape_temperature,
+    refuse_inside,
+    tapes_of,
+    tell_without_effect,
+    too_many_straps,
+)
+from tankcal.messages import message
+
+MOST_APART = 0.05  # great circles of one sphere, of their size
+
+
+def check_great_circles(values, tables, registers, raw, log):
+    """Great circles with a tape, each in one place; obstructions and tape checks that fit."""
+    table = tables["great_circles"]
+    if not has_great_circles(tables):
+        tell_without_effect(tables, log)
+        if values is not None:
+            _refuse_settings(values, raw, log)
+        return
+    if len(table.rows) > MOST_STRAPS:
+        log.problem(table.file, too_many_straps(len(table.rows)))
+        return
+    tapes = tapes_of(registers)
+    _check_circles(table, log)
+    check_readings(_as_straps(table), tables, registers, raw, log)
+    if has_wall_points(tables):
+        expected = message(
+            "circles_beside_points",
+            "given together with points or a survey of them; expected only one of them: the form"
+            " comes from either",
+        )
+        log.problem(table.file, expected)
+    if is_metered(tables):
+        expected = message(
+            "liquid_beside_circles", "given together with great_circles.csv; expected only one"
+        )
+        log.problem(tables["liquid"].file, expected)
+    if all(use == "check" for use in table.of("use")):
+        log.problem(
+            table.file,
+            message(
+                "all_circles_checks", "every row is a check; expected one at least that counts"
+            ),
+        )
+    if values is not None:
+        _check_settings(values, table, tapes, raw, log)
+
+
+def _as_straps(table):
+    """The readings with the names that circumferences have; a great circle is pulled in one."""
+    named = {"circumference": table.columns["circle"], "pulls": None}
+    return replace(table, columns=table.columns | named)
+
+
+def _check_circles(table, log):
+    """The equator has no azimuth, a meridian has one, and repeats are of one circle."""
+    places = {}
+    columns = map(table.of, ("circle", "kind", "azimuth_deg"))
+    for row, name, kind, azimuth in zip(table.rows, *columns, strict=True):
+        if kind == "meridian" and azimuth is None and not log.has(table.file, row, "azimuth_deg"):
+            expected = message(
+                "meridian_without_azimuth",
+                "blank; expected the azimuth of the plane of the meridian",
+            )
+            log.problem(table.file, expected, row, "azimuth_deg")
+        if kind == "equator" and azimuth is not None:
+            expected = message(
+                "equator_with_azimuth",
+                "found {azimuth:g}; expected a blank: the equator has no azimuth",
+                azimuth=azimuth,
+            )
+            log.problem(table.file, expected, row, "azimuth_deg")
+        if name is None or kind is None:
+            continue
+        first = places.setdefault(name, ((kind, azimuth), row))
+        if first[0] != (kind, azimuth):
+            expected = message(
+                "circle_elsewhere",
+                "circle {name!r} is another one in row {row}; expected repeats of one circle, or"
+                " another name",
+                name=name,
+                row=first[1],
+            )
+            log.problem(table.file, expected, row, "circle")
+
+
+def _refuse_settings(values, raw, log):
+    """Settings of strapped spheres beside a sphere that was not strapped."""
+    for key in ("ovality_mm", "form_mm"):
+        if values["sphere"][key] is not None:
+            expected = message(
+                "only_with_circles", "without effect: the job has no great circles by tape"
+            )
+            tell(log.problem, raw, "sphere", key, expected)
+
+
+def _check_settings(values, table, tapes, raw, log):
+    if values["sphere"]["diameter_m"] is not None:
+        expected = message(
+            "size_beside_circles",
+            "given together with {file}; expected only one of them: the size comes from the"
+            " circles",
+            file=table.file,
+        )
+        tell(log.problem, raw, "sphere", "diameter_m", expected)
+    check_tape_temperature(table, tapes, raw, log)
+    refuse_inside(values, raw, log)
+    _check_sizes(values, table, log)
+
+
+def _check_sizes(values, table, log):
+    """Readings of one sphere, of the size of the drawing."""
+    readings, nominal = table.numbers("reading_m"), values["tank"]["nominal_diameter_m"]
+    if not np.any(np.isfinite(readings)):
+        return
+    usual, far = float(np.nanmedian(readings)), np.zeros(len(readings), dtype=bool)
+    if nominal is not None and not 1 / UNIT_FACTOR <= usual / (np.pi * nominal) <= UNIT_FACTOR:
+        usual, far = np.pi * nominal, np.arange(len(readings)) == 0
+    far |= np.abs(readings / np.nanmedian(readings) - 1) > MOST_APART
+    for row, reading in zip(np.array(table.rows)[far], readings[far], strict=True):
+        expected = message(
+            "circle_of_other_size",
+            "found {reading:g}; expected about {usual:.4g} m, as the other circles or the drawing"
+            " have it: is it in another unit, or no great circle?",
+            reading=reading,
+            usual=usual,
+        )
+        log.problem(table.file, expected, int(row), "reading_m")

@@ -1,0 +1,100 @@
+"""A gauge tube in the round section of a lying tank: the depth of the liquid by the dip along it.
+
+A tank that was rolled about its axis on its saddles carries its tube off the plumb, and a tube may
+pass the axis at a distance. Seen from end A, x to the right, z up, the tube that leans to the right
+by the angle a and passes e to the right of the axis has at the distance t from its middle
+
+    (x, z) = e (cos a, -sin a) + t (sin a, cos a),
+
+and touches the wall of radius R at t = -w, w = sqrt(R^2 - e^2). With the dip d = t + w, the liquid
+stands above the lowest point of the section, where a plumb dip would find it, by
+
+    depth(d) = R + (d - w) cos a - e sin a.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.errors import SolutionError
+from tankcal.messages import message
+
+STEEPEST = np.radians(80)
+
+
+@dataclass(frozen=True)
+class GaugeTube:
+    """A straight tube across a round section.
+
+    Attributes
+    ----------
+    radius_m : float
+        Of the section.
+    angle_rad : float
+        Off the plumb, in the plane of the section; its top leans to the right as seen from A.
+    offset_m : float
+        Distance at which it passes the axis, to the right of it as seen from A when plumb.
+
+    Raises
+    ------
+    SolutionError
+        For a tube that does not cross the section, or lies.
+
+    Examples
+    --------
+    Through the axis, 60 degrees off the plumb: dip 0 is half a radius above the lowest point.
+
+    >>> tube = GaugeTube(1.0, np.radians(60), 0.0)
+    >>> tube.depth_m(np.array([0.0, 1.0])).round(9).tolist(), round(float(tube.full_m), 9)
+    ([0.5, 1.0], 3.0)
+    """
+
+    radius_m: float
+    angle_rad: float
+    offset_m: float
+
+    def __post_init__(self):
+        if not (abs(self.offset_m) < self.radius_m and abs(self.angle_rad) <= STEEPEST):
+            raise SolutionError(
+                message(
+                    "tube_off_tank",
+                    "a gauge tube {offset_m:g} m from the axis, {angle_deg:g} degrees off the "
+                    "plumb, in a tank of radius {radius_m:g} m: expected one that crosses it",
+                    offset_m=self.offset_m,
+                    angle_deg=np.degrees(self.angle_rad),
+                    radius_m=self.radius_m,
+                )
+            )
+
+    @property
+    def foot_m(self):
+        """From the wall, where the tube ends, to its middle: w."""
+        return np.sqrt(self.radius_m**2 - self.offset_m**2) if self.offset_m else self.radius_m
+
+    @property
+    def full_m(self):
+        """Dip of the full section; above the wall the tube goes on in its nozzle."""
+        rise = self.offset_m * np.sin(self.angle_rad)
+        return self.foot_m + (self.radius_m + rise) / np.cos(self.angle_rad)
+
+    @property
+    def slope(self):
+        """Derivative of the depth by the dip."""
+        return np.cos(self.angle_rad)
+
+    def depth_m(self, dips_m):
+        """(rows,) depths above the lowest point of the section."""
+        return self.radius_m + self._over_axis(dips_m)
+
+    def derivatives(self, dips_m):
+        """{input: of the depth at a fixed dip} by "radius", "tube_angle" and "tube_offset"."""
+        sin, cos = np.sin(self.angle_rad), np.cos(self.angle_rad)
+        return {
+            "radius": 1 - self.radius_m / self.foot_m * cos,
+            "tube_angle": -(dips_m - self.foot_m) * sin - self.offset_m * cos,
+            "tube_offset": self.offset_m / self.foot_m * cos - sin,
+        }
+
+    def _over_axis(self, dips_m):
+        sin, cos = np.sin(self.angle_rad), np.cos(self.angle_rad)
+        return (dips_m - self.foot_m) * cos - self.offset_m * sin

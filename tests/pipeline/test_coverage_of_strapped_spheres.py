@@ -1,0 +1,76 @@
+"""Do 95 % intervals hold the truth on strapped spheres that are no ellipsoids?
+
+Petals, columns and dents of `generated_solids`, oblate by their weight, strapped with a taut tape
+(`strapped_balls`); the truth is that of dense directions.
+"""
+
+import numpy as np
+import pytest
+from conftest import EXAMPLE
+from draws import draws
+from generated_solids import SPHERES, make_sphere
+from strapped_balls import strapped_job
+
+from tankcal.pipeline.strapped_sphere import find_strapped_sphere
+from tankcal.pipeline.tanks import body_of
+from tankcal.tank.capacity import Capacity
+
+FOLDER = EXAMPLE.parent / "sphere-straps"
+LEAST_HELD, ROWS = 0.94, 10
+
+
+def flattened(rng, family):
+    """A ball of a family that its weight flattened by up to 0.15 % of its radius."""
+    ball = make_sphere(rng, family)
+    flat = rng.uniform(0, 1e-3) * ball.radius_m
+    ball.departures.append(lambda d: -flat * (1.5 * d[..., 2] ** 2 - 0.5))
+    return ball
+
+
+def found_of(rng, family):
+    """Errors and U of ten rows over the total."""
+    ball = flattened(rng, family)
+    job = strapped_job(rng, ball, FOLDER, meridians=int(rng.integers(3, 7)))
+    body = body_of(job, find_strapped_sphere(job, lambda text: None))
+    dips = np.append(ball.height_m * np.arange(1, ROWS) / ROWS, body.highest_m)
+    truth = ball.volume_below(dips)
+    volumes, areas, sources = body.rows(dips)
+    table = Capacity(dips, volumes, areas, sources, 0.95)
+    return (volumes - truth) / truth[-1], table.U_m3 / truth[-1]
+
+
+def study(balls, figure, seed):
+    """Held shares of totals and rows."""
+    rng, every = np.random.default_rng(seed), []
+    for family in SPHERES:
+        found = [found_of(rng, family) for _ in range(balls)]
+        error, expanded = (np.array(one) for one in zip(*found, strict=True))
+        held = np.abs(error) <= expanded
+        every.append((error, expanded))
+        figure(
+            f"strapped {family}: held total, rows", f"{held[:, -1].mean():.3f} {held.mean():.3f}"
+        )
+    error, expanded = (np.concatenate(one) for one in zip(*every, strict=True))
+    held = np.abs(error) <= expanded
+    wide = expanded.mean(axis=0) / 1.96 / np.sqrt(np.mean(error**2, axis=0))
+    figure(f"{len(held)} strapped spheres: held total, rows",
+           f"{held[:, -1].mean():.3f} {held.mean():.3f}")  # fmt: skip
+    figure("strapped spheres: mean error of the total, ppm", f"{1e6 * error[:, -1].mean():.0f}")
+    figure("strapped spheres: U over 1.96 rms errors, rows", " ".join(f"{o:.2f}" for o in wide))
+    return held
+
+
+@pytest.mark.slow
+def test_intervals_hold_on_strapped_spheres(figure):
+    held = study(8, figure, 5)
+    least = LEAST_HELD - 3 * np.sqrt(0.95 * 0.05 / len(held))
+    assert held[:, -1].mean() > least
+    assert held.mean() > least
+
+
+@pytest.mark.study
+def test_intervals_hold_on_strapped_spheres_study(figure):
+    held = study(draws(30, 150), figure, 17)
+    least = LEAST_HELD - 3 * np.sqrt(0.95 * 0.05 / len(held))
+    assert held[:, -1].mean() > least
+    assert held.mean() > least
