@@ -174,6 +174,15 @@ def test_a_line_for_each_check(capsys, kept):
     assert "Verticalidad, eje: +29,1 mm, U 14,4 mm, límite ≤ 95 mm" in out[2]
 
 
+@pytest.mark.parametrize("strength", ["250e6", "36000", "-1", "nan"])
+def test_a_yield_stress_in_another_unit_is_refused(capsys, strength):
+    """Pascals would make every limit of settlement wide enough; the job has the same bound."""
+    with pytest.raises(SystemExit) as end:
+        main(["inspect", str(EXAMPLE), f"--yield-mpa={strength}"])
+    assert end.value.code == 2
+    assert "--yield-mpa" in capsys.readouterr().err
+
+
 def test_settlement_is_refused_whole(tmp_path):
     """Every problem of both tables, before a survey is computed."""
     for name, text in (("a.csv", "point,elevation_m\nP1,x\n"), ("b.csv", "radius_m\n1\n")):

@@ -353,6 +353,27 @@ def test_a_workbook_has_numbers_as_numbers(tmp_path):
     assert [row[4] for row in gaps] == pytest.approx([o["gap_mm"] for o in found["gaps"]])
 
 
+def test_a_workbook_says_the_warnings_and_prints_headings_again(tmp_path):
+    """What is not judged stands beside the verdicts; long tables have headings on every page."""
+    found = plain()
+    found["warnings"] = [{"file": "job", "row": None, "column": None, "code": "levels_odd",
+                          "text": "a warning of its own", "values": {}}]  # fmt: skip
+    flat = found["gaps"][0] | {"kind": "banding", "gap_mm": None, "U_mm": None, "azimuth_deg": 0.0}
+    found["gaps"] = [*found["gaps"], flat]
+    paper = InspectionPaper(found)
+    workbook.write(paper, tmp_path / "i.xlsx")
+    book = openpyxl.load_workbook(tmp_path / "i.xlsx")
+    checks_ = [row[0] for row in book["Checks"].iter_rows(values_only=True)]
+    assert paper.warning(found["warnings"][0]) in checks_
+    for sheet in book:
+        row = int(sheet.print_title_rows.split(":")[0].strip("$"))
+        head = max(t.ref for t in sheet.tables.values()) if len(sheet.tables) == 1 else None
+        assert any(t.ref.startswith(f"A{row}:") for t in sheet.tables.values())
+        assert head is None or head.startswith(f"A{row}:")
+    (*_, last) = book["Welds"].iter_rows(values_only=True)
+    assert last[3] in (None, "–")
+
+
 def test_no_text_of_a_user_is_a_formula(tmp_path):
     workbook.write(InspectionPaper(hostile()), tmp_path / "i.xlsx")
     cells = [c for s in openpyxl.load_workbook(tmp_path / "i.xlsx") for row in s for c in row]
