@@ -68,8 +68,10 @@ def add(commands):
 
 
 def _inspect(options):
+    from tankcal.cli.asked_language import asked_language, asked_of_record
+
     prepare_for_small_work()
-    speak(options.language)
+    speak(options.language or asked_of_record(options.source) or asked_language(options.source))
     from tankcal.inspection.inspecting import Asked, inspect_files
     from tankcal.record.inspection import plain_of_inspection
 

@@ -33,6 +33,7 @@ from tankcal.report.inspection import paper as papers
 from tankcal.report.inspection.bottom import points as levelled_points
 from tankcal.report.inspection.bottom import settlement
 from tankcal.report.inspection.pages import checks, counts, limits, pages, reading, result
+from tankcal.report.inspection.wall import courses, welds
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 
@@ -144,6 +145,16 @@ def test_the_largest_gaps_come_first_and_open_ones_never():
 
 
 # ---- what is said
+
+
+def test_sections_in_which_nothing_is_known_are_left_out():
+    found = plain()
+    closed = [one | {"gap_mm": None, "U_mm": None} for one in found["gaps"]]
+    assert welds(InspectionPaper(found))
+    assert welds(InspectionPaper(found | {"gaps": closed})) == []
+    assert courses(InspectionPaper(found | {"gaps": closed}))
+    nothing = {"gaps": closed, "levels": [], "generatrices": None}
+    assert courses(InspectionPaper(found | nothing)) == []
 
 
 def test_how_many_checks_came_out_how():
