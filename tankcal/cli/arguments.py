@@ -30,6 +30,22 @@ def positive(text):
     return value
 
 
+def yield_mpa(text):
+    from tankcal.job.plausibility import MOST_YIELD_MPA
+
+    value = positive(text)
+    if value > MOST_YIELD_MPA:
+        raise refuse_argument(
+            message(
+                "option_yield",
+                "found {text!r}; expected at most {most} MPa (is it in another unit?)",
+                text=text,
+                most=MOST_YIELD_MPA,
+            )
+        )
+    return value
+
+
 def share(text):
     value = _number(text)
     if not 0 < value < 1:

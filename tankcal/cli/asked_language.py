@@ -1,5 +1,6 @@
 """The language that a job asks for, found before all else, so that its problems are told in it."""
 
+import json
 from pathlib import Path
 
 from tankcal.job.excel import MAX_FILE_BYTES, Unreadable, read_sheets
@@ -35,6 +36,18 @@ def asked_of_plan(path):
     try:
         return nearest_language(_in_settings(path / PLAN_FILE if path.is_dir() else path, Log()))
     except (OSError, ValueError):
+        return None
+
+
+def asked_of_record(path):
+    """The language of the job that a record, or the one in a folder of results, was made of."""
+    from tankcal.inspection.basis import RECORD
+
+    path = Path(path)
+    try:
+        record = json.loads((path / RECORD if path.is_dir() else path).read_bytes())
+        return nearest_language(record["job"]["table"]["language"])
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
         return None
 
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, positive
+from tankcal.cli.arguments import add_language, yield_mpa
 from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.showing import (
     Progress,
@@ -55,7 +55,7 @@ def add(commands):
     inspect.add_argument(
         "--yield-mpa",
         metavar="MPA",
-        type=positive,
+        type=yield_mpa,
         help="yield stress of the steel, for the limits of settlement (default: as the job says)",
     )
     inspect.add_argument(
@@ -68,8 +68,10 @@ def add(commands):
 
 
 def _inspect(options):
+    from tankcal.cli.asked_language import asked_language, asked_of_record
+
     prepare_for_small_work()
-    speak(options.language)
+    speak(options.language or asked_of_record(options.source) or asked_language(options.source))
     from tankcal.inspection.inspecting import Asked, inspect_files
     from tankcal.record.inspection import plain_of_inspection
 

@@ -1,24 +1,21 @@
-"""The bottom along radial lines: where its edge bends down, by how much, and what bulges of it.
+"""The bottom along radial lines: where its edge bends down, and by how much.
 
 Two straight lines through the readings meet at the break-over point x. The edge is R - x wide, R
 being the shell's radius, and drops by
 
     B = z(x) - z(R) = -m (R - x),    m the slope of the outer line
 
-A bulge is what stands above the line of the bottom inside of there; its radius is half of its
-length along the profile. One line sees neither its highest place nor the circle that fits in it.
+What bulges inside of there is found by `bulges`.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
-from scipy import sparse
-from scipy.optimize import linprog
 from scipy.stats import chi2, f
 
 from tankcal.adjust import ALPHA
 from tankcal.gum.coverage import coverage_factor
+from tankcal.inspection.bulges import find_bulge
 from tankcal.inspection.figures import PROBABILITY, Figure
 from tankcal.inspection.levelling import LEAST_READINGS
 from tankcal.inspection.settlement_limits import largest_drop_mm
@@ -28,8 +25,6 @@ from tankcal.record.inspection import EdgeProfile, InspectionLimit
 FAR_FROM_SHELL_M = 0.3  # of the last reading: from there to the shell the line is carried on
 WIDEST_EDGE, WIDEST_EDGE_M = 0.3, 3.0  # of the radius, and in all
 ZONE = 3.0  # times that: the readings that the bent line goes through
-LEAST_IN_BULGE = 3  # readings: a narrower bulge is not told from one bad reading
-SIGNIFICANT = 2.0  # u that a bulge stands off
 BEYOND_SHELL = 1.02  # of the shell's radius: farther out is another unit, or another tank
 
 
@@ -61,26 +56,6 @@ class Break:
         width = shell_radius_m - self.radius_m
         gradient = np.array([0.0, 0.0, -width, self.outer])
         return -self.outer * width, float(np.sqrt(gradient @ self.cofactor @ gradient))
-
-
-@dataclass(frozen=True)
-class Bulge:
-    """What stands above or below the line of the bottom.
-
-    Attributes
-    ----------
-    radius_m : float
-        Of the place, from the tank's centre.
-    height_m, u_m : float
-        Up positive; standard uncertainty, nan: not known.
-    half_length_m : float
-        Half of its length along the profile.
-    """
-
-    radius_m: float
-    height_m: float
-    u_m: float
-    half_length_m: float
 
 
 def bent_line(r, unknowns):
@@ -175,75 +150,6 @@ def _bends(r, z, weights):
             x = (one[0] - two[0]) / (two[1] - one[1])
         if r[k] < x < r[k + 1]:
             yield left + right, (one[0] + one[1] * x, one[1], two[1], x)
-
-
-def find_bulge(r, z, sd, height_per_radius=None):
-    """The bulge or dent of a profile that is largest against its radius (or highest), or None.
-
-    The bottom's own slope is the line of least absolute deviations, that a bulge over less than
-    half of the profile does not move; a bulge goes from where the bottom leaves it to where it is
-    back.
-
-    Parameters
-    ----------
-    r, z : ndarray, shape (n,)
-        Rising radii and elevations, m, inside of the break-over point.
-    sd : ndarray, shape (n,), or None
-    height_per_radius : float, optional
-        The limit, a ratio; None: the highest is taken.
-
-    Returns
-    -------
-    Bulge or None
-        None: no three readings in a row are on one side of that line, off it by more than their U.
-
-    Examples
-    --------
-    >>> r, z = np.arange(8.0), np.array([0.0, 0.0, 0.0, 0.02, 0.03, 0.02, 0.0, 0.0])
-    >>> found = find_bulge(r, z, None)
-    >>> found.height_m, found.half_length_m
-    (0.03, 2.0)
-    """
-    if len(r) < LEAST_READINGS:
-        return None
-    off = z - _line_of_least_deviations(r, z)
-    off[np.abs(off) < 1e-9] = 0.0  # what the solver leaves
-    starts = np.flatnonzero(np.diff(np.sign(off), prepend=np.nan))
-    found = []
-    for i, j in pairwise((*starts, len(r))):
-        if j - i < LEAST_IN_BULGE or off[i] == 0:
-            continue
-        at = i + int(np.argmax(np.abs(off[i:j])))
-        leverage = 1 / len(r) + (r[at] - r.mean()) ** 2 / np.sum((r - r.mean()) ** 2)
-        u = np.nan if sd is None else float(sd[at] * np.sqrt(1 + np.pi / 2 * leverage))
-        if np.isnan(u) or abs(off[at]) > SIGNIFICANT * u:
-            half = (_crossing(r, off, j - 1, j) - _crossing(r, off, i, i - 1)) / 2
-            found.append(Bulge(float(r[at]), float(off[at]), u, float(half)))
-    if height_per_radius is None:
-        return max(found, key=lambda one: abs(one.height_m), default=None)
-    return max(found, key=lambda one: abs(one.height_m) / one.half_length_m, default=None)
-
-
-def _line_of_least_deviations(r, z):
-    """(n,) the line through a profile with the least sum of absolute deviations."""
-    count = len(r)
-    columns = sparse.csr_array(np.column_stack([np.ones(count), r - r.mean()]))
-    eye = sparse.eye_array(count)
-    found = linprog(
-        np.concatenate([np.zeros(2), np.ones(2 * count)]),
-        A_eq=sparse.hstack([columns, eye, -eye]),
-        b_eq=z - z.mean(),
-        bounds=[(None, None)] * 2 + [(0, None)] * (2 * count),
-    )
-    return z.mean() + columns @ found.x[:2]
-
-
-def _crossing(r, off, last, beyond):
-    """Radius where the departure ends between a reading and the one beyond; the end of the line."""
-    if not 0 <= beyond < len(r):
-        return r[last]
-    share = off[last] / (off[last] - off[beyond])
-    return r[last] + share * (r[beyond] - r[last])
 
 
 # ---- what is judged, and what is saved

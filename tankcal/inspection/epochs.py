@@ -1,6 +1,8 @@
 """Epochs of a levelling: what each has, its points against what is asked for, and differences."""
 
+import re
 from dataclasses import dataclass
+from datetime import date
 
 import numpy as np
 from scipy.stats import chi2, f
@@ -64,6 +66,32 @@ class Levelling:
     sd_known: bool
     dof: float
     radius_m: float | None
+
+
+def is_date(name):
+    """Whether a name is a date whose order is that of its letters: 2024, 2024-05, 2024-05-31.
+
+    >>> [is_date(name) for name in ("2024", "2024-05", "2024-02-30", "31-12-2019", "2024-5-31")]
+    [True, True, False, False, False]
+    """
+    if not re.fullmatch(r"[0-9]{4}(-[0-9]{2}){0,2}", name):
+        return False
+    try:
+        date.fromisoformat((name + "-01-01")[:10])
+    except ValueError:
+        return False
+    return True
+
+
+def is_like_a_date(name):
+    """Whether a name is of numbers and hyphens, as dates are, but is none (31-12-2019)."""
+    return re.fullmatch(r"[0-9]+(-[0-9]+){1,2}", name) is not None and not is_date(name)
+
+
+def in_order(epochs):
+    """Epochs by date where all names are dates such as 2024, 2024-05 or 2024-05-31."""
+    dated = all(is_date(one.name) for one in epochs)
+    return sorted(epochs, key=lambda one: one.name) if dated else epochs
 
 
 def differences(levelling, log):

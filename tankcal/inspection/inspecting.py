@@ -267,7 +267,7 @@ def _of_set_aside(basis):
     text = message(
         "inspect_set_aside",
         "{count} points near the wall were not taken for it and are not judged, the farthest "
-        "{point} ({residual_mm:+.0f} mm, {height_m:.2f} m up, azimuth {azimuth_deg:.0f} deg): "
+        "{point} ({residual_mm:+.1f} mm, {height_m:.2f} m up, azimuth {azimuth_deg:.0f} deg): "
         "fittings or slips, or a dent? look there",
         count=len(found),
         **worst,

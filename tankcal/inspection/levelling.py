@@ -12,7 +12,15 @@ from scipy.stats import chi2
 from tankcal.adjust import ALPHA
 from tankcal.errors import SolutionError
 from tankcal.geometry.circles import fit_circle
-from tankcal.inspection.epochs import LEAST_POINTS, SHOWN, WIDEST_GAP_DEG, Epoch, Levelling
+from tankcal.inspection.epochs import (
+    LEAST_POINTS,
+    SHOWN,
+    WIDEST_GAP_DEG,
+    Epoch,
+    Levelling,
+    in_order,
+    is_like_a_date,
+)
 from tankcal.inspection.out_of_plane import arcs_after
 from tankcal.job.checking import missing_beside, tiny_sd
 from tankcal.job.contract.shorthand import number, positive
@@ -102,7 +110,7 @@ def read_settlement(path, log):
                        " uncertainty is known, so nothing can be said to pass")  # fmt: skip
         log.warning(values.file, text)
     dof = np.inf if given else float(dof)
-    return Levelling(values.file, tuple(_in_order(made)), given, dof, radius_m)
+    return Levelling(values.file, tuple(in_order(made)), given, dof, radius_m)
 
 
 def _epoch(name, values, groups, places, sd_m):
@@ -168,7 +176,7 @@ def _marks(data):
 
 
 def _epochs_of_rows(values, log):
-    """Name of the epoch of each row; blanks among names, and two spellings, are told."""
+    """Name of the epoch of each row; blanks, two spellings and what is no date are told."""
     names, first = values.of("epoch"), {}
     if not any(names):
         return [ONE_EPOCH] * len(names)
@@ -178,6 +186,10 @@ def _epochs_of_rows(values, log):
             log.problem(values.file, text, row, "epoch")
             continue
         known, known_row = first.setdefault(name.casefold(), (name, row))
+        if is_like_a_date(name) and known_row == row:
+            text = message("levels_no_date", "found {name!r}; expected a date such as 2024-05-31,"
+                           " or a name", name=name)  # fmt: skip
+            log.problem(values.file, text, row, "epoch")
         if known != name:
             text = message("levels_epoch_spelt", "found {name!r}; expected {known!r}, as in row"
                            " {first_row}", name=name, known=known,
@@ -344,12 +356,6 @@ def _check_epoch(epoch, file, log):
                        " millimetres?", epoch=epoch.name, rise=float(np.ptp(epoch.z_m)),
                        most=MOST_RISE_M)  # fmt: skip
         log.problem(file, text, None, "elevation_m")
-
-
-def _in_order(epochs):
-    """Epochs by date where all names are dates such as 2024, 2024-05 or 2024-05-31."""
-    is_date = all(len(one.name) >= 4 and one.name.replace("-", "").isdecimal() for one in epochs)
-    return sorted(epochs, key=lambda one: one.name) if is_date else epochs
 
 
 # ---- edge_profiles.csv

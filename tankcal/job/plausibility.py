@@ -18,6 +18,8 @@ CARBON_STEEL, STAINLESS_STEEL, ALUMINIUM = METALS = (
 SHELLS = (*METALS, "other")
 INSIDE, MIDDLE, OUTSIDE = DIAMETERS = ("inside", "middle", "outside")
 
+MOST_YIELD_MPA = 2000  # of a shell's steel: more is pascals or psi
+
 FIRST_YEAR = 1900  # of a survey
 DAYS_AHEAD = 1  # of a survey, for time zones
 DAYS_TO_ISSUE = 60  # a certificate may be prepared before its day

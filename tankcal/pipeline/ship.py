@@ -1,7 +1,7 @@
 """Tables of corrections for trim and list of a tank of a ship, with what is uncertain of them."""
 
 from dataclasses import dataclass, replace
-from math import ceil, tan
+from math import ceil, floor, tan
 
 import numpy as np
 
@@ -162,9 +162,13 @@ def undeclared_of_ship(job, survey):
 
 
 def _soundings(job, cells):
-    """From 0 by the step to the highest sounding at which a tank becomes full, within the pipe."""
+    """From 0 by the step to the highest sounding at which a tank becomes full, within the pipe.
+
+    Where the last step is beyond the pipe's end, the last sounding is that of a whole millimetre.
+    """
     ship = job.ship
-    highest = min(max(cell.highest_m for cell in cells), ship_pipe(ship).length_m)
+    length = ship_pipe(ship).length_m
+    highest = min(max(cell.highest_m for cell in cells), length)
     step = ship.correction_step_m
     if step is None:
         step = next((one for one in STEPS_M if highest / one <= ABOUT), STEPS_M[-1])
@@ -181,7 +185,10 @@ def _soundings(job, cells):
         )
         raise InputError(Problem("job.toml", expected, column="ship.correction_step_m"))
     soundings = np.round(step * np.arange(count), 9)
-    return soundings[soundings <= ship_pipe(ship).length_m * (1 + 1e-12)]
+    if soundings[-1] > length * (1 + 1e-12):  # no step ends within the pipe: its last millimetre
+        last = min(ceil(1e3 * highest - 1e-6), floor(1e3 * length + 1e-6)) / 1e3
+        soundings = np.append(soundings[:-1], last if last > soundings[-2] else [])
+    return soundings
 
 
 def _refuse_falling(job, found, level):

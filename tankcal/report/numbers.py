@@ -96,10 +96,11 @@ def unit(name):
 
 
 def symbol(text):
-    """A unit as the record writes it, as it is printed: "m3/kg/m3" is "m³/(kg/m³)"."""
+    """A unit as the record writes it, as it is printed: "m3/kg/m3" is "m³/(kg/m³)", "deg" "°"."""
     if not text or text == "1":  # of a ratio
         return None
-    above, _, below = text.replace("m3", "m³").replace("m2", "m²").partition("/")
+    text = text.replace("m3", "m³").replace("m2", "m²").replace("degC", "°C").replace("deg", "°")
+    above, _, below = text.partition("/")
     return f"{above}/({below})" if "/" in below else f"{above}/{below}" if below else above
 
 

@@ -8,6 +8,7 @@ from conftest import EXAMPLE
 from job_builder import write_job
 
 from tankcal.cli import main
+from tankcal.cli.asked_language import asked_of_record
 from tankcal.cli.showing import speak
 from tankcal.errors import InputError
 from tankcal.inspection.inspecting import Asked, inspect_files
@@ -172,6 +173,31 @@ def test_a_line_for_each_check(capsys, kept):
     out = capsys.readouterr().out.replace("\N{NO-BREAK SPACE}", " ").splitlines()
     assert len(out) == 2 + 7  # the rule, that it was not read, the checks
     assert "Verticalidad, eje: +29,1 mm, U 14,4 mm, límite ≤ 95 mm" in out[2]
+
+
+def test_it_speaks_the_language_of_its_job_or_record(tmp_path, capsys):
+    job = write_job(tmp_path / "job", settings={"table.language": "es"})
+    assert main(["inspect", str(job), "--quiet", "--out", str(tmp_path / "out")]) == 0
+    assert main(["inspect", str(job), "--quiet", "--language", "pt-BR"]) == 0
+    speak("en")
+    out = capsys.readouterr().out
+    assert "Verticalidad, eje" in out
+    assert "Verticalidade, eixo" in out
+    (tmp_path / "record.json").write_text('{"job": {"table": {"language": "pt-BR"}}}')
+    assert asked_of_record(tmp_path) == asked_of_record(tmp_path / "record.json") == "pt-BR"
+    for text in ("{", "[1]", '{"job": 1}', "[" * 100_000):
+        (tmp_path / "record.json").write_text(text)
+        assert asked_of_record(tmp_path) is None
+    assert asked_of_record(tmp_path / "none") is None
+
+
+@pytest.mark.parametrize("strength", ["250e6", "36000", "-1", "nan"])
+def test_a_yield_stress_in_another_unit_is_refused(capsys, strength):
+    """Pascals would make every limit of settlement wide enough; the job has the same bound."""
+    with pytest.raises(SystemExit) as end:
+        main(["inspect", str(EXAMPLE), f"--yield-mpa={strength}"])
+    assert end.value.code == 2
+    assert "--yield-mpa" in capsys.readouterr().err
 
 
 def test_settlement_is_refused_whole(tmp_path):

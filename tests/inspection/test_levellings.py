@@ -140,6 +140,16 @@ WRONG = {
     ),
     "a blank epoch": (GOOD.replace("P4,67.5,12.0971,1,2019", "P4,67.5,12.0971,1,"),
                       [("levels_no_epoch", 5, "epoch")]),
+    "days before months": (
+        settlement_rows({"31-12-2019": POINTS, "01-06-2025": POINTS}),
+        [("levels_no_date", 2, "epoch"), ("levels_no_date", 18, "epoch")],
+    ),
+    "a month of one digit": (
+        settlement_rows({"2024-5-31": POINTS, "2024-11-01": POINTS}),
+        [("levels_no_date", 2, "epoch")],
+    ),
+    "no day of the calendar": (GOOD.replace(",2024", ",2024-02-30"),
+                               [("levels_no_date", 18, "epoch")]),
     "two spellings": (
         settlement_rows({"As built": POINTS, "as built": POINTS}),
         [("levels_epoch_spelt", row, "epoch") for row in range(18, 34)],

@@ -149,6 +149,9 @@ def test_the_soundings_end_with_the_full_tank_or_the_pipe(tmp_path):
     settings = {"ship.pipe_top_m": [-5.5, -2.5, 5.0], "ship.correction_step_m": 0.2}
     ship = result_of(tmp_path / "job", settings=settings).ship
     assert ship.sounding_m[-1] == pytest.approx(5.0)
+    settings["ship.pipe_top_m"] = [-5.5, -2.5, 5.13]
+    between = result_of(tmp_path / "between", settings=settings).ship
+    assert between.sounding_m[-2:].tolist() == pytest.approx([5.0, 5.13])
     settings["ship.pipe_top_m"] = [-5.5, -2.5, 9.0]
     longer = result_of(tmp_path / "longer", settings=settings).ship
     assert longer.sounding_m[-1] >= longer.full_m.max() > longer.sounding_m[-2]
@@ -160,9 +163,10 @@ def test_no_sounding_has_a_correction(tmp_path):
     """A step beyond the tank, where a dry pipe hides less than at even keel."""
     settings = {
         "ship.pipe_bottom_m": [-5.5, -2.5, 1.0],
+        "ship.pipe_top_m": [-5.2, -2.5, 12.0],
         "ship.trim_m": [5.0],
         "ship.list_deg": [10.0],
-        "ship.correction_step_m": 5.5,
+        "ship.correction_step_m": 8.0,
     }
     ship = result_of(tmp_path / "job", settings=settings).ship
     assert set(ship.state.ravel()) <= {"below", "full"}

@@ -33,6 +33,7 @@ from tankcal.report.inspection import paper as papers
 from tankcal.report.inspection.bottom import points as levelled_points
 from tankcal.report.inspection.bottom import settlement
 from tankcal.report.inspection.pages import checks, counts, limits, pages, reading, result
+from tankcal.report.inspection.wall import courses, welds
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 
@@ -144,6 +145,16 @@ def test_the_largest_gaps_come_first_and_open_ones_never():
 
 
 # ---- what is said
+
+
+def test_sections_in_which_nothing_is_known_are_left_out():
+    found = plain()
+    closed = [one | {"gap_mm": None, "U_mm": None} for one in found["gaps"]]
+    assert welds(InspectionPaper(found))
+    assert welds(InspectionPaper(found | {"gaps": closed})) == []
+    assert courses(InspectionPaper(found | {"gaps": closed}))
+    nothing = {"gaps": closed, "levels": [], "generatrices": None}
+    assert courses(InspectionPaper(found | nothing)) == []
 
 
 def test_how_many_checks_came_out_how():
@@ -351,6 +362,27 @@ def test_a_workbook_has_numbers_as_numbers(tmp_path):
     assert {row[heads.index("Lido no texto")] for row in figures_} == {"NÃO"}
     gaps = list(book["Soldas"].iter_rows(min_row=5, values_only=True))
     assert [row[4] for row in gaps] == pytest.approx([o["gap_mm"] for o in found["gaps"]])
+
+
+def test_a_workbook_says_the_warnings_and_prints_headings_again(tmp_path):
+    """What is not judged stands beside the verdicts; long tables have headings on every page."""
+    found = plain()
+    found["warnings"] = [{"file": "job", "row": None, "column": None, "code": "levels_odd",
+                          "text": "a warning of its own", "values": {}}]  # fmt: skip
+    flat = found["gaps"][0] | {"kind": "banding", "gap_mm": None, "U_mm": None, "azimuth_deg": 0.0}
+    found["gaps"] = [*found["gaps"], flat]
+    paper = InspectionPaper(found)
+    workbook.write(paper, tmp_path / "i.xlsx")
+    book = openpyxl.load_workbook(tmp_path / "i.xlsx")
+    checks_ = [row[0] for row in book["Checks"].iter_rows(values_only=True)]
+    assert paper.warning(found["warnings"][0]) in checks_
+    for sheet in book:
+        row = int(sheet.print_title_rows.split(":")[0].strip("$"))
+        head = max(t.ref for t in sheet.tables.values()) if len(sheet.tables) == 1 else None
+        assert any(t.ref.startswith(f"A{row}:") for t in sheet.tables.values())
+        assert head is None or head.startswith(f"A{row}:")
+    (*_, last) = book["Welds"].iter_rows(values_only=True)
+    assert last[3] in (None, "–")
 
 
 def test_no_text_of_a_user_is_a_formula(tmp_path):

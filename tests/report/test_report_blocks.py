@@ -26,6 +26,7 @@ def test_unknown_unit_is_an_error():
 
 def test_symbol():
     assert symbol("m3/mm") == "m³/mm"
+    assert [symbol("deg"), symbol("m3/deg")] == ["°", "m³/°"]
     assert symbol(None) is None
 
 

@@ -3,7 +3,7 @@
 from tankcal.job.contract.kinds import LOADED, VERTICAL, WITH_POINTS
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.fields import Field
-from tankcal.job.plausibility import DIAMETERS, SERVICES, SHELLS
+from tankcal.job.plausibility import DIAMETERS, MOST_YIELD_MPA, SERVICES, SHELLS
 
 MESH_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
 
@@ -107,7 +107,7 @@ INSPECTION = (
     positive(
         "yield_mpa",
         "yield stress of the shell's steel, MPa; limits of settlement need it",
-        2000,
+        MOST_YIELD_MPA,
         kinds=VERTICAL,
     ),
 )

@@ -134,7 +134,7 @@ GAPS = Table(
         _mm("gap_mm", heading="gap"),
         _mm("U_mm", heading="U"),
     ),
-    rows=lambda found: found["gaps"],
+    rows=lambda found: gap_rows(found),
 )
 
 POINTS = Table(
@@ -226,6 +226,14 @@ def _sheet_row(paper, one):
         "verified": bound["verified"],
         "unit": one["unit"] or None,
     }
+
+
+def gap_rows(found):
+    """The gaps; a horizontal weld without one has no azimuth, for its boards go all round."""
+    return [
+        one | {"azimuth_deg": None} if one["kind"] == "banding" and one["gap_mm"] is None else one
+        for one in found["gaps"]
+    ]
 
 
 def checks_of(found, *codes):

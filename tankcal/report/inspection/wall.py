@@ -61,7 +61,7 @@ def levels(paper):
 def courses(paper):
     """What each course departs by."""
     rows = course_rows(paper.found)
-    if not rows:
+    if all(value is None for row in rows for key, value in row.items() if key != "course"):
         return []
     said = paper.word("texts.courses")
     if any(kind in row for row in rows for kind in KINDS):
@@ -70,9 +70,12 @@ def courses(paper):
 
 
 def welds(paper):
-    """Peaking and banding: profiles of the worst boards, the largest gaps, how many are open."""
+    """Peaking and banding: profiles of the worst boards, the largest gaps, how many are open.
+
+    Nothing where no gap is known: the checks and their remarks have said so, and why.
+    """
     found = paper.found
-    if not found["gaps"]:
+    if all(one["gap_mm"] is None for one in found["gaps"]):
         return []
     rows = [row for kind in KINDS for row in largest_gaps(found, kind)]
     drawn = any(figures.profiles_of(found, kind) for kind in KINDS)

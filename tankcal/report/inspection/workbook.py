@@ -13,6 +13,7 @@ from tankcal.report.inspection.tables import (
     READINGS,
     SHEET_OF_CHECKS,
     course_rows,
+    gap_rows,
     generatrix_rows,
     level_rows,
     place_rows,
@@ -41,7 +42,7 @@ def write(paper, path):
                 (COURSES, course_rows(found)),
                 (PLACES, place_rows(found)),
             ),
-            "welds": ((GAPS, found["gaps"]),),
+            "welds": ((GAPS, gap_rows(found)),),
             "settlement": ((PLANES, plane_rows(found)), (POINTS, point_rows(found))),
             "edges": ((EDGES, found["edges"]), (READINGS, reading_rows(found))),
         }
@@ -64,7 +65,7 @@ def _as_record(found):
 
 
 def _checks(book, paper):
-    """What came out, what it is not, and every check with its limit and where that stands."""
+    """What came out, what it is not, every check with its limit, remarks and warnings."""
     sheet = book.sheet("checks", landscape=True, tab="result")
     columns = columns_of(book, SHEET_OF_CHECKS, sheet_rows(paper))
     widths = set_widths(book, sheet, columns)
@@ -80,19 +81,21 @@ def _checks(book, paper):
         look = {} if number else {"bold": True, "font_size": 12}
         book.paragraph(sheet, row, text, widths, **look)
         row += 1
+    sheet.repeat_rows(row + 1)
     row = write_table(book, sheet, row + 1, SHEET_OF_CHECKS.name, columns, widths=widths) + 2
-    for text in remarks(paper):
+    for text in (*remarks(paper), *map(paper.warning, found["warnings"])):
         book.paragraph(sheet, row, text, widths)
         row += 1
 
 
 def _sheet(book, code, tables):
-    """Tables one below the other; one alone keeps its headings in sight."""
+    """Tables one below the other, the last with headings on every page; one alone keeps them."""
     sheet, row = book.sheet(code, landscape=True), HEAD_ROW
     columns = [columns_of(book, table, rows) for table, rows in tables]
     widths = set_widths(book, sheet, *columns)
     for (table, _), cells in zip(tables, columns, strict=True):
         filtered = {"autofilter": True} if len(tables) == 1 else {}
+        sheet.repeat_rows(row)
         row = write_table(book, sheet, row, table.name, cells, widths=widths, **filtered) + 2
     if len(tables) == 1:
         book.freeze(sheet, HEAD_ROW, 1)
