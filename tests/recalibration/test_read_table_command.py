@@ -118,6 +118,27 @@ def test_a_lying_tank(tmp_path, capsys):
     assert tankcal.load(out).tank.kind == "horizontal"
 
 
+@pytest.mark.parametrize("kind", ["sphere", "horizontal"])
+def test_a_table_of_another_kind_of_tank_is_refused(folder, capsys, kind):
+    """An upright tank's rows: no sphere and no lying tank has them."""
+    assert run(folder, "--kind", kind, "--out", str(folder / "job")) == 3
+    said = capsys.readouterr().err
+    assert ("no tank of this kind" if kind == "sphere" else "depart by ") in said
+    assert not (folder / "job").exists()
+
+
+@pytest.mark.parametrize("bottom", ["50", "5.69"])
+def test_a_bottom_above_the_rows_is_refused(folder, capsys, bottom):
+    assert run(folder, "--bottom", bottom) == 2
+    assert "--bottom: " in capsys.readouterr().err
+
+
+def test_the_job_asks_for_the_language_of_the_run(folder, capsys):
+    out = folder / "job"
+    assert run(folder, "--out", str(out), "--language", "pt-BR") == 0
+    assert tankcal.load(out).table.language == "pt-BR"
+
+
 def test_u_of_the_former_table_is_that_of_all_radii(folder):
     """Closed form: U/V of 0.2 %, k = 2, is 0.05 % of the radius."""
     toml = folder / "former.toml"
