@@ -125,7 +125,7 @@ def _former(path, former_toml, log):
 
 
 def _read_solid(former, kind):
-    found = fit_sphere(former) if kind == "sphere" else fit_lying(former)
+    found = fit_sphere(former) if kind == "sphere" else fit_lying(former, former.dip_from_a_m)
     fit = found if kind == "sphere" else found.best
     share = fit.rms_m3 / former.volume_m3[-1]
     if fit.variance_factor > 1 and share > WORST_FIT:

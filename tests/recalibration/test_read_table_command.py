@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from former_tables import SimulatedTank, table_of
 from numpy.testing import assert_allclose
+from test_solid_geometry import lying
 
 import tankcal
 from tankcal.cli import main
@@ -116,6 +117,21 @@ def test_a_lying_tank(tmp_path, capsys):
     assert "2.499967" in said
     assert "8.00018" in said
     assert tankcal.load(out).tank.kind == "horizontal"
+
+
+def test_a_leaning_tank_that_is_dipped_near_its_low_end(tmp_path):
+    """By slices: 8 mm/m over 9 m; the lowest liquid lies below the bottom at half the length."""
+    dips = np.arange(0, 261, 2) / 100
+    volumes = lying(dips, 2.6, 9.0, tilt=0.008, place=1.5)
+    lines = [f"{dip:.2f},{1000 * v:.0f}" for dip, v in zip(dips, volumes, strict=True)]
+    (tmp_path / "lying.csv").write_text("\n".join(["dip_m,volume_L", *lines]))
+    said = '[former]\nfile = "lying.csv"\nkind = "horizontal"\ndip_from_a_m = 1.5\n'
+    (tmp_path / "former.toml").write_text(said)
+    fit = read_table(tmp_path / "former.toml").geometry.best
+    assert fit.variance_factor == 1
+    for name, truth in (("diameter", 2.6), ("length", 9.0), ("zero", 0.0), ("tilt", 0.008)):
+        value, u = fit[name]
+        assert abs(value - truth) < 3 * u
 
 
 @pytest.mark.parametrize("kind", ["sphere", "horizontal"])
