@@ -11,7 +11,7 @@ from tankcal.cli.showing import (
     prepare_for_small_work,
     print_paths,
     say,
-    speak,
+    speak_of_record,
     warn,
 )
 from tankcal.messages import message
@@ -59,7 +59,7 @@ def add(commands):
 
 def _compare(options):
     prepare_for_small_work()
-    speak(options.language)
+    speak_of_record(options.language, options.new, options.old)
     from tankcal.recalibration.inputs import Asked, compare_files
     from tankcal.record.comparison import plain_of_comparison
 

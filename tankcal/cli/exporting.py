@@ -1,12 +1,17 @@
 """`tankcal export`: files for gauging and inventory systems, from a record."""
 
 import re
-from contextlib import suppress
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language, parse_list, positive
 from tankcal.cli.machine import add_json, print_json
-from tankcal.cli.showing import language_of_run, prepare_for_small_work, say, speak
+from tankcal.cli.showing import (
+    language_of_run,
+    prepare_for_small_work,
+    say,
+    speak,
+    speak_of_record,
+)
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
@@ -64,7 +69,7 @@ def _export(options):
     from tankcal.report.outputs import record_file
 
     source, error = record_file(options.record), options.max_error_l
-    _speak_as(options, source)
+    speak_of_record(options.language, source)
     profile, language = find_profile(options.profile), language_of_run()
     export = export_record(
         source, profile, points=options.points,
@@ -97,16 +102,6 @@ def _refuse_missing(options):
     missing = [Problem(name, text) for name, given, text in needed if given is None]
     if missing:
         raise InputError(missing)
-
-
-def _speak_as(options, source):
-    """Speak the language that is asked for, else that of the record's job."""
-    from tankcal.record import load
-    from tankcal.text.languages import nearest_language
-
-    if options.language is None:
-        with suppress(InputError, AttributeError, KeyError, TypeError):
-            speak(nearest_language(load(source)["job"]["table"]["language"]))
 
 
 def _out(options, export, source):

@@ -4,10 +4,14 @@ import os
 import shutil
 import sys
 import time
+from contextlib import suppress
+from pathlib import Path
 
+from tankcal.errors import InputError
 from tankcal.messages import Message, message
 from tankcal.text.languages import DEFAULT, nearest_language
 
+RECORD = "record.json"
 _LOCALE = ("LC_ALL", "LC_MESSAGES", "LANG")  # the first that is set counts
 JUDGED_S, MILLION = 2.0, 1_000_000  # of a step, before the time left is told
 TO_THE_END = "\x1b[K"  # a terminal clears the rest of the line
@@ -29,6 +33,21 @@ def speak(language=None):
 def words_of_run():
     """The words of the language that is spoken; {}: English."""
     return _spoken
+
+
+def speak_of_record(language, *sources):
+    """Speak a language; None: that of the first source that is a record, or holds one."""
+    from tankcal.record import load
+
+    speak(language)
+    for path in () if language is not None else map(Path, sources):
+        record = path / RECORD if path.is_dir() else path
+        if record.suffix.lower() == ".json" and record.is_file():
+            with suppress(InputError, AttributeError, KeyError, TypeError):
+                asked = nearest_language(load(record)["job"]["table"]["language"])
+                if asked is not None:
+                    return speak(asked)
+    return None
 
 
 def language_of_run():

@@ -3,7 +3,15 @@
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language, positive
-from tankcal.cli.showing import marks, prepare_for_small_work, print_paths, say, speak, warn
+from tankcal.cli.showing import (
+    language_of_run,
+    marks,
+    prepare_for_small_work,
+    print_paths,
+    say,
+    speak_of_record,
+    warn,
+)
 from tankcal.messages import message
 from tankcal.text.digits import fixed, format_with_u
 
@@ -56,7 +64,7 @@ def add(commands):
 
 def _read_table(options):
     prepare_for_small_work()
-    speak(options.language)
+    speak_of_record(options.language, options.file)
     from tankcal.recalibration.read_table import read_table
     from tankcal.report.table_job import refuse_foreign_job, write_job
 
@@ -74,7 +82,7 @@ def _read_table(options):
     for line in _summary(read):
         say(line)
     if options.out is not None:
-        written = write_job(read.job, options.out)
+        written = write_job(read.job, options.out, language_of_run())
         print_paths(Path(options.out), written)
         say(message("read_run", "  tankcal run {folder}", folder=str(options.out)))
 

@@ -2,7 +2,7 @@
 
 from tankcal.cli.arguments import add_language
 from tankcal.cli.machine import add_json, print_json, problem_of
-from tankcal.cli.showing import prepare_for_small_work, say, speak
+from tankcal.cli.showing import prepare_for_small_work, say, speak_of_record
 from tankcal.messages import message
 
 
@@ -32,7 +32,7 @@ def add(commands):
 
 def _verify(options):
     prepare_for_small_work()
-    speak(options.language)
+    speak_of_record(options.language, options.results)
     from tankcal.report.verification import verify
 
     found = verify(options.results, options.job)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.exports.breakpoints import best_breakpoints, fewest_breakpoints, polyline_error
-from tankcal.exports.marks import marks_of
+from tankcal.exports.marks import ON_THE_MARK_M, marks_of
 from tankcal.exports.profiles import MOST_POINTS
 from tankcal.exports.splines import fewest_spline_breakpoints, spline_breakpoints, spline_error
 from tankcal.messages import message
@@ -67,7 +67,10 @@ class Asked:
         if self.points is None and self.max_error_m3 is None and grid != "breakpoints":
             rows = np.flatnonzero(marks.stands) if grid == "every row" else self._steps(marks)
             judge = spline_error if self.profile.interpolation == "spline" else polyline_error
-            given = (self.height, self.volume, marks.at_m, marks.written_m3, rows)
+            if grid == "every row":
+                rows = _less_shifted_top(marks, rows, self.height)
+            read = slice(int(rows[-1]) + 1) if grid == "every row" else slice(None)
+            given = (self.height[read], self.volume[read], marks.at_m, marks.written_m3, rows)
             return (rows, *judge(*given)) if len(rows) > 1 else (rows, 0.0, 0.0)
         if "volume" not in self.profile.columns:
             text = message("export_increments_only", "has volumes of increments only; expected "
@@ -161,3 +164,11 @@ class Asked:
                            " that the system takes, {largest:.9g}", volume=shown,
                            unit=profile.volume_unit, largest=profile.largest)  # fmt: skip
             self.tell(text, "volumes.largest")
+
+
+def _less_shifted_top(marks, rows, height):
+    """The rows without the highest one, where it alone is on no mark: at the next mark its volume
+    would stand for another dip.
+    """
+    is_off = np.abs(marks.at_m[rows] - height[rows]) > ON_THE_MARK_M
+    return rows[:-1] if len(rows) > 2 and is_off[-1] and not is_off[:-1].any() else rows

@@ -47,6 +47,8 @@ class Export:
         Provenance.
     data : bytes
         The file.
+    left_out_m : float or None
+        Dip of the highest row of the table, where the file ends below it.
     """
 
     profile: object
@@ -61,6 +63,7 @@ class Export:
     gauge: GaugeCorrection | None
     facts: tuple
     data: bytes
+    left_out_m: float | None = None
 
     @property
     def lines(self):
@@ -127,6 +130,7 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
     return Export(
         profile, record.job.tank.id, marks.at_m[listed], marks.written_m3[listed], len(height),
         error + own, at, own, int(off_mark.sum()), gauge, tuple(facts), data,
+        None if rows[-1] == len(height) - 1 else float(height[-1]),
     )  # fmt: skip
 
 

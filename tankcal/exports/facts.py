@@ -58,11 +58,21 @@ def report_of(export):
                 "program that reads straight lines must not use this file",
             )
         )
+    if export.left_out_m is not None:
+        found.append(
+            message(
+                "export_top_left_out",
+                "the highest row, {dip:.6g} m, is on no level of this profile and is left out: "
+                "above {high:.6g} m the file says nothing",
+                dip=export.left_out_m,
+                high=export.dip_m[-1],
+            )
+        )
     if export.rounded_levels:
         found.append(
             message(
                 "export_rounded",
-                "{count} levels had to be rounded; the error above counts it",
+                "levels that had to be rounded: {count}; the error above counts it",
                 count=export.rounded_levels,
             )
         )

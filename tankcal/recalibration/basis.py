@@ -311,16 +311,19 @@ def _head(former, new, facts, densities, zero, dips, basis):
         lacking = ("courses.thickness_mm",) if facts.is_shell else ("courses",)
         return _none(dips, "not_possible", lacking=lacking, **values)
     rings = Rings(facts.edges_m(), facts.thickness_m, facts.modulus_pa, is_first_order=False)
-    radii = radii_of_rows(rings, dips, basis, was.kg_m3)
+    zone = former.roof and former.roof.critical_m
+    zone = zone and tuple(one - zero for one in zone)
+    radii = radii_of_rows(rings, dips, basis, was.kg_m3, zone)
     added = rings.volume_m3(dips, radii, is_now.kg_m3) - rings.volume_m3(dips, radii, was.kg_m3)
     source = "read" if "read" in (was.source, is_now.source) else "declared"
     return Step(added, "done", source, **values)
 
 
-def radii_of_rows(rings, dips, volumes, density):
+def radii_of_rows(rings, dips, volumes, density, zone=None):
     """(courses,) unloaded radii of the rings by what volumes rise within them.
 
-    A ring that no two rows reach gets that of the next one below.
+    A ring that no two rows reach gets that of the next one below. Over the critical zone of a roof
+    (dips from and to) the rows rise by less than the ring holds: it counts on one side of it.
     """
     radii, edges = np.empty(len(rings.thickness_m)), rings.edges_m.copy()
     edges[-1] = max(edges[-1], dips[-1])
@@ -329,6 +332,7 @@ def radii_of_rows(rings, dips, volumes, density):
         for k in range(len(radii)):
             inside = np.flatnonzero((dips >= edges[k] - 1e-9) & (dips <= edges[k + 1] + 1e-9))
             inside = inside[len(inside) // 2 :] if k == 0 and len(inside) > 5 else inside
+            inside = _beside(zone, inside, dips)
             radii[k] = radii[k - 1] if k else np.sqrt(volumes[-1] / np.pi / dips[-1])
             if len(inside) > 1:
                 one, two = inside[0], inside[-1]
@@ -336,6 +340,15 @@ def radii_of_rows(rings, dips, volumes, density):
                 radii[k] = np.sqrt(max(rise, 1e-9) / np.pi / (dips[two] - dips[one]))
         head = rings.volume_m3(dips, radii, density) - rings.volume_m3(dips, radii, 0.0)
     return radii
+
+
+def _beside(zone, inside, dips):
+    """Those rows (indices) that lie on one side of a critical zone, the side of more rows."""
+    if zone is None:
+        return inside
+    above = inside[dips[inside] >= zone[1] - 1e-9]
+    below = inside[dips[inside] <= zone[0] + 1e-9]
+    return above if len(above) >= len(below) else below
 
 
 def _roof(former, new, facts, densities, zero, dips, basis):

@@ -385,12 +385,23 @@ def _read(former, new, basis):
 def _warnings(former, new, basis):
     """Problems that deserve a look: of both tables, and of their zeros."""
     found = [*former.warnings, *new.warnings]
+    if former.date and new.date and str(former.date)[:10] > str(new.date)[:10]:
+        text = message(
+            "compare_dates_turned",
+            "of {date}, later than {other} of {newer}: is the former table the new one? no age is "
+            "judged",
+            date=str(former.date)[:10],
+            other=new.name,
+            newer=str(new.date)[:10],
+        )
+        found.append(Problem(former.name, text))
     zero = basis.zero
     if zero.source == "fitted":
         text = message(
             "compare_zero_or_bottom",
-            "all volumes differ by {volume:.4g} m3, as if the zero stood {height:.1f} mm higher; a "
-            "bottom that has changed looks the same: declare both reference heights to tell",
+            "all volumes differ by {volume:.4g} m3, as if the zero had moved by {height:+.1f} mm "
+            "(+: up); a bottom that has changed looks the same: declare both reference heights to "
+            "tell",
             volume=zero.volume_m3,
             height=1000 * zero.height_m,
         )

@@ -56,7 +56,11 @@ def _radii(facts, basis):
         return facts.inside_m
     rings = Rings(facts.edges_m(), facts.thickness_m, facts.modulus_pa, is_first_order=False)
     density = basis.densities[1].kg_m3 or 0.0
-    return radii_of_rows(rings, basis.height_m, basis.new_m3, density)
+    zone, afloat = None, np.flatnonzero(~basis.for_use)
+    if len(afloat):
+        first, last = max(afloat[0] - 1, 0), min(afloat[-1] + 1, len(basis.height_m) - 1)
+        zone = basis.height_m[first], basis.height_m[last]
+    return radii_of_rows(rings, basis.height_m, basis.new_m3, density, zone)
 
 
 def _u_of_tables(basis, former_U, new_U, c, ends, radius):

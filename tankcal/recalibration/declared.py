@@ -42,6 +42,7 @@ FORMER = (
     number("common", "correlation of its errors with those of the new table", 0, 1),
     positive("rounding_m3", "value of the last digit of its volumes, m3", 1000),
     positive("reference_height_m", "from the dip plate to the reference point, metres", 200),
+    number("dip_from_a_m", "of a lying tank: the dip point, along its cylinder from A", 0, 200),
     Field("date", "date", "day of the calibration, year-month-day"),
     Field("method", "text", "how the tank was measured"),
     Field("laboratory", "text", "who calibrated it"),

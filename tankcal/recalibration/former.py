@@ -57,6 +57,9 @@ class FormerTable:
     date, method, laboratory, number : str or None
         As declared, or as the record has them.
     kind : {"vertical", "horizontal", "sphere", "mesh"} or None
+    dip_from_a_m : float or None
+        Of a lying tank: the dip point, along the axis from the start of its cylinder; None: half
+        the length.
     factor_m3 : (rows, inputs) ndarray or None
         Of a record: covariance = factor factor'.
     record : dict or None
@@ -86,6 +89,7 @@ class FormerTable:
     laboratory: str | None = None
     number: str | None = None
     kind: str | None = None
+    dip_from_a_m: float | None = None
     factor_m3: np.ndarray | None = None
     record: dict | None = None
     height_rounding_m: np.ndarray | None = None

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.recalibration.read_courses import read_courses
@@ -19,6 +19,7 @@ from tankcal.recalibration.upright_geometry import STEEL_PA, read_upright
 FEWEST_ROWS = 8
 SOLIDS = "horizontal", "sphere"
 ABOVE_M = 0.02  # that a table may go beyond its courses
+WORST_FIT = 5e-3  # of the highest volume, rms: rows that depart by more are of another tank
 LARGE_SHARE = 2e-3  # of the table, that a thing which may be a roof takes
 
 
@@ -109,6 +110,7 @@ def read_table(
         courses = read_courses(courses_path, log)
     if former is not None:
         _check_kind(former, kind, log)
+        _check_bottom(former, bottom_m, log)
     log.stop_if_problems()
     courses, warnings, seams_known = _fitting(former, courses)
     return _read(former, courses, warnings, e_pa, bottom_m, seams_known)
@@ -123,8 +125,20 @@ def _former(path, former_toml, log):
 
 
 def _read_solid(former, kind):
-    found = fit_sphere(former) if kind == "sphere" else fit_lying(former)
+    found = fit_sphere(former) if kind == "sphere" else fit_lying(former, former.dip_from_a_m)
     fit = found if kind == "sphere" else found.best
+    share = fit.rms_m3 / former.volume_m3[-1]
+    if fit.variance_factor > 1 and share > WORST_FIT:
+        raise SolutionError(
+            message(
+                "read_other_solid",
+                "the rows of {name} depart by {percent:.2g} % of the highest volume (rms) from any "
+                "tank of kind {kind}; expected a table of such a tank (--kind)",
+                name=str(former.name),
+                percent=100 * share,
+                kind=kind,
+            )
+        )
     job = job_of_solid(former, fit, tank_id=_tank_of(former))
     return TableRead(former, found, (), job, (*_of_solid(found), *_of_job(former, 0.0)))
 
@@ -170,6 +184,19 @@ def _check_kind(former, kind, log):
             fewest=FEWEST_ROWS,
         )
         log.problem(former.name, expected)
+
+
+def _check_bottom(former, bottom_m, log):
+    above = 0 if bottom_m is None else np.count_nonzero(former.height_m >= bottom_m)
+    if bottom_m is not None and above < FEWEST_ROWS:
+        expected = message(
+            "read_high_bottom",
+            "{bottom:.6g} m: {count} rows from there on; expected {fewest} or more",
+            bottom=bottom_m,
+            count=int(above),
+            fewest=FEWEST_ROWS,
+        )
+        log.problem("--bottom", expected)
 
 
 def _fitting(former, courses):

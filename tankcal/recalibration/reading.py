@@ -17,7 +17,7 @@ MOST_FINDINGS = 20  # of the linter, that a refusal repeats
 USUAL_K = 2.0
 _RECORD_VALUES = (
     "reference_temperature_c", "liquid_density_kg_m3", "reference_height_m", "date", "method",
-    "laboratory", "number", "kind",
+    "laboratory", "number", "kind", "dip_from_a_m",
 )  # fmt: skip
 
 
@@ -233,6 +233,7 @@ def _of_record(path, record, declared, log):
         "laboratory": certificate.get("laboratory"),
         "number": certificate.get("number"),
         "kind": job["tank"].get("kind"),
+        "dip_from_a_m": (job.get("horizontal") or {}).get("dip_from_a_m"),
     }
     for key in _RECORD_VALUES:
         said = declared[key]

@@ -63,7 +63,9 @@ class StrappingRecord(Saved):
 
     readings: list[StrapReading] = key("in the order of the file")
     tapes: list[TapeUsed] = key("those that were read")
-    courses: list[StrapOfCourse] = key("from the bottom up")
+    courses: list[StrapOfCourse] = key(
+        "from the bottom up; beside former radii only those that were measured again"
+    )
     shape_sd_m: float = key(
         "standard deviation of the radius round the wall: declared, or by the points"
     )
@@ -146,8 +148,13 @@ def _radius_sds(result):
 
 
 def _courses(result):
+    """Courses, or rings; beside former radii only those that were measured again."""
     straps, found, sds = result.straps, [], _radius_sds(result)
-    for index, course in enumerate(result.job.courses or result.job.rings):
+    courses = list(enumerate(result.job.courses or result.job.rings))
+    if result.radii is not None:  # what the others have is a former radius, inside: no strap's
+        measured = result.radii.updated.update.measured.tolist()
+        courses = [courses[index] for index in measured]
+    for index, course in courses:
         radius, whole = straps.radius_m[index], straps.circumference_m[index]
         found.append(
             StrapOfCourse(

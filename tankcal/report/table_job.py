@@ -3,10 +3,12 @@
 import numpy as np
 
 from tankcal.report.folders import refuse_foreign, replaced
+from tankcal.text.languages import DEFAULT
 
+SETTINGS = "job.toml"
 COVARIANCE = "radii_cov.npz"
 FILES = (
-    *("job.toml", "courses.csv", "radii.csv", COVARIANCE, "bottom.csv", "deadwood.csv"),
+    *(SETTINGS, "courses.csv", "radii.csv", COVARIANCE, "bottom.csv", "deadwood.csv"),
     "uncertainty.csv",
 )
 
@@ -16,12 +18,17 @@ def refuse_foreign_job(directory):
     refuse_foreign(directory, FILES)
 
 
-def write_job(job, directory):
-    """Write the files of a `JobOfTable`, all or nothing; returns their names."""
+def write_job(job, directory, language=DEFAULT):
+    """Write the files of a `JobOfTable`, all or nothing; returns their names.
+
+    language  of its papers, a code
+    """
     has_radii = job.covariance_m2 is not None
     names = [name for name in FILES if name in job.texts or (name == COVARIANCE and has_radii)]
     with replaced(directory) as folder:
         for name, text in job.texts.items():
+            if name == SETTINGS and language != DEFAULT:
+                text = text.replace("[table]\n", f'[table]\nlanguage = "{language}"\n', 1)
             (folder / name).write_text(text, encoding="utf-8")
         if has_radii:
             np.savez(

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import pytest
 from conftest import EXAMPLE
+from exported_records import lying, record_with, rows
 
 import tankcal
 from tankcal.cli import main
 from tankcal.cli.showing import speak
+from tankcal.record import save
 
 OTHERS = ("pt-BR", "es")
 ENGLISH = re.compile(
@@ -163,3 +165,23 @@ def text_of(node):
             text_of(one) if isinstance(one, ast.Constant) else "{}" for one in node.values
         )
     return ""
+
+
+@pytest.mark.parametrize(
+    "command", [["compare", "RECORD", "RECORD", "--quiet"], ["verify", "FOLDER"], ["read-table",
+     "RECORD"], ["export", "FOLDER", "--profile", "nobody"]]
+)  # fmt: skip
+def test_the_language_of_a_record_is_spoken(tmp_path, capsys, command):
+    """That of its job, where none is asked for; in English where --language says so."""
+    record = record_with(*rows(lying, 2.4, 0.05))
+    record["job"]["table"]["language"] = "pt-BR"
+    save(record, tmp_path / "record.json")
+    places = {"RECORD": str(tmp_path / "record.json"), "FOLDER": str(tmp_path)}
+    given = [places.get(one, one) for one in command]
+    main(given)
+    theirs = told(capsys)
+    main([*given, "--language", "en"])
+    ours = told(capsys)
+    assert english(ours)
+    assert len(theirs) == len(ours)
+    assert theirs != ours

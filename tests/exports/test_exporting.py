@@ -137,6 +137,20 @@ def test_zero_row_offsets_order_and_marks(lying_record):
     assert read_rows(without.data, ",")[0][0] == 0.05
 
 
+@pytest.mark.parametrize("code", ["aveva-centimetres", "jd-edwards"])
+def test_a_highest_row_off_the_marks_is_left_out(tmp_path, code):
+    """At the next centimetre it would say 4 mm of the tank too little there: some 30 L."""
+    height = np.append(np.arange(240) / 100, 2.396)
+    export = export_record(exact_record(tmp_path, lying, height), find_profile(code))
+    assert export.dip_m[-1] == pytest.approx(2.39)
+    assert export.left_out_m == 2.396
+    assert export.rounded_levels == 0
+    dips = np.linspace(0.0, 2.39, 5001)
+    read = np.interp(dips, export.dip_m, export.volume_m3)
+    assert np.abs(read - lying(dips)).max() <= export.error_m3 < 0.02
+    assert "export_top_left_out" in [one.code for one in export.lines]
+
+
 def test_increments_of_volume_add_up(lying_record):
     """Property: the increments, summed, are the rounded volumes of the rows."""
     export = export_record(lying_record, find_profile("jd-edwards-increments"))

@@ -17,6 +17,7 @@ from radii_jobs import HEIGHTS_M, RADII_M, closed_volume_m3, partial_parts, radi
 import tankcal
 from tankcal.errors import SolutionError
 from tankcal.pipeline.radii_update import update_radii
+from tankcal.record.strapping import strapping_of
 
 EXAMPLES_AT = Path(__file__).resolve().parents[2] / "examples"
 # The page prints +0.028 % for the first: 0.02746 % rounded twice.
@@ -90,6 +91,14 @@ def test_a_job_with_one_course_strapped_again(tmp_path):
     after = found.covariance_with(job.inputs)
     expected = prior - np.outer(prior[0], prior[0]) / (prior[0, 0] + noise)
     assert_allclose(after, expected, rtol=1e-6)
+
+
+def test_the_straps_tell_nothing_of_courses_that_kept_their_former_radius(tmp_path):
+    """Former radii are inside; a table of straps took them for outside ones, less plate again."""
+    told = strapping_of(computed(tmp_path, partial_parts(("1", "3")))).courses
+    assert [one.course for one in told] == ["1", "3"]
+    inside = [one.inside_radius_m for one in told]  # at the survey: by the steel and 11 K more
+    assert_allclose(inside, [RADII_M[0], RADII_M[2]], atol=1.5e-3)
 
 
 def test_the_top_row_has_the_covariance_of_the_radii(tmp_path):

@@ -66,6 +66,25 @@ def test_a_roof_in_a_lighter_liquid(weighing):
 # ---- invariance
 
 
+def test_the_head_of_a_tank_with_a_roof():
+    """Closed form: 850 to 740 kg/m3 in S-1; its first course is cut by the critical zone."""
+    former = new_s1()
+    light = rings_m3(former.height_m, RADII, 740.0)
+    added = light - rings_m3(former.height_m, RADII, 850.0)
+    roofs = [FormerRoof(42_000.0, rho, "air", (1.2, 1.5)) for rho in (850.0, 740.0)]
+    afloat = np.clip((former.height_m - 1.2) / 0.3, 0, 1)
+    taken = 42_000.0 * (1 - 1.2 / 8000) / (np.array([850.0, 740.0]) - 1.2)
+    pair = (
+        replace(former, volume_m3=former.volume_m3 - taken[0] * afloat, roof=roofs[0]),
+        replace(
+            former, volume_m3=former.volume_m3 + added - taken[1] * afloat, roof=roofs[1],
+            liquid_density_kg_m3=740.0,
+        ),
+    )  # fmt: skip
+    steps = bring_to_one_basis(*pair, S1).steps
+    assert steps["head"].added_m3 == pytest.approx(added, rel=1e-3, abs=1e-6)
+
+
 def test_a_table_with_itself_differs_nowhere():
     table = new_s1()
     basis = bring_to_one_basis(table, table, S1)

@@ -240,3 +240,14 @@ def test_one_comparison_in_twenty_calls_an_unchanged_tank_another(c, figure):
         rate = 100 * number / count
         figure(f"|E_n| > 1, c = {c}, {name}", f"{rate:.2f} % of {count}")
         assert abs(rate - 5) < max(0.5, 3 * np.sqrt(5 * 95 / count))
+
+
+def test_a_former_table_of_a_later_day_is_told():
+    """Day of the former one after that of the new one: turned round, or a slip."""
+    dips = np.round(np.arange(0.1, 8.41, 0.1), 3)
+    former, new = former_s1(dips, digit=0.001), new_s1(dips)
+    for day, is_told in (("2031-01-01", True), ("2011-01-01", False)):
+        pair = replace(former, date=day), replace(new, date="2026-05-31")
+        found = compare(*pair, courses=COURSES, fingerprints=("1" * 64, "2" * 64))
+        codes = [one.code for one in found.warnings]
+        assert ("compare_dates_turned" in codes) is is_told

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from former_tables import SimulatedTank, table_of
 from numpy.testing import assert_allclose
+from test_solid_geometry import lying
 
 import tankcal
 from tankcal.cli import main
@@ -116,6 +117,42 @@ def test_a_lying_tank(tmp_path, capsys):
     assert "2.499967" in said
     assert "8.00018" in said
     assert tankcal.load(out).tank.kind == "horizontal"
+
+
+def test_a_leaning_tank_that_is_dipped_near_its_low_end(tmp_path):
+    """By slices: 8 mm/m over 9 m; the lowest liquid lies below the bottom at half the length."""
+    dips = np.arange(0, 261, 2) / 100
+    volumes = lying(dips, 2.6, 9.0, tilt=0.008, place=1.5)
+    lines = [f"{dip:.2f},{1000 * v:.0f}" for dip, v in zip(dips, volumes, strict=True)]
+    (tmp_path / "lying.csv").write_text("\n".join(["dip_m,volume_L", *lines]))
+    said = '[former]\nfile = "lying.csv"\nkind = "horizontal"\ndip_from_a_m = 1.5\n'
+    (tmp_path / "former.toml").write_text(said)
+    fit = read_table(tmp_path / "former.toml").geometry.best
+    assert fit.variance_factor == 1
+    for name, truth in (("diameter", 2.6), ("length", 9.0), ("zero", 0.0), ("tilt", 0.008)):
+        value, u = fit[name]
+        assert abs(value - truth) < 3 * u
+
+
+@pytest.mark.parametrize("kind", ["sphere", "horizontal"])
+def test_a_table_of_another_kind_of_tank_is_refused(folder, capsys, kind):
+    """An upright tank's rows: no sphere and no lying tank has them."""
+    assert run(folder, "--kind", kind, "--out", str(folder / "job")) == 3
+    said = capsys.readouterr().err
+    assert ("no tank of this kind" if kind == "sphere" else "depart by ") in said
+    assert not (folder / "job").exists()
+
+
+@pytest.mark.parametrize("bottom", ["50", "5.69"])
+def test_a_bottom_above_the_rows_is_refused(folder, capsys, bottom):
+    assert run(folder, "--bottom", bottom) == 2
+    assert "--bottom: " in capsys.readouterr().err
+
+
+def test_the_job_asks_for_the_language_of_the_run(folder, capsys):
+    out = folder / "job"
+    assert run(folder, "--out", str(out), "--language", "pt-BR") == 0
+    assert tankcal.load(out).table.language == "pt-BR"
 
 
 def test_u_of_the_former_table_is_that_of_all_radii(folder):
