@@ -20,7 +20,15 @@ import tankcal
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.job import load
-from tankcal.job.contract import COLUMNS, KEYS, KINDS, REGISTER_KEYS, REQUIRED_TABLES, SURVEYS
+from tankcal.job.contract import (
+    COLUMNS,
+    KEYS,
+    KINDS,
+    REGISTER_KEYS,
+    REQUIRED_TABLES,
+    SURVEYS,
+    columns_of,
+)
 from tankcal.job.fields import read_value
 from tankcal.job.sheets import is_read
 from tankcal.job.starter import write_input_workbook
@@ -179,13 +187,13 @@ def test_every_column_has_its_heading_unit_note_example_and_rule(tmp_path, kind,
     for table in form.tables:
         sheet = book[table]
         columns, row = headings_of(sheet)
-        assert list(columns) == [field.name for field in COLUMNS[table]]
+        assert list(columns) == [field.name for field in columns_of(table, kind)]
         assert sheet.freeze_panes == f"C{row + 1}"
         assert (sheet.page_setup.paperSize, sheet.page_setup.fitToHeight) == (9, 0)
         above = [[cell.value for cell in line] for line in sheet.iter_rows(max_row=row - 1)]
         assert all(line[0].startswith("#") for line in above)
         rules = {str(rule.sqref): rule for rule in sheet.data_validations.dataValidation}
-        for field in COLUMNS[table]:
+        for field in columns_of(table, kind):
             column = columns[field.name] - 1
             said = [line[column] for line in above]
             assert field.note in said
