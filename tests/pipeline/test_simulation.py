@@ -241,7 +241,7 @@ def test_slopes_are_those_of_the_tank_with_its_inputs_moved(tank, figure):
         volumes = [body_of(job, survey, uncertain=False).volume_m3(levels) for job in moved]
         by_differences = (volumes[0] - volumes[1]) / (2 * step)
         size = np.abs(slopes[name]).max()
-        assert np.max(np.abs(slopes[name] - by_differences)) < allowed * size, name
+        assert np.max(np.abs(slopes[name] - by_differences)) <= allowed * size, name
         tried.append(name)
     figure(f"slopes tried on a {tank.job.tank.kind} tank", len(tried))
     assert len(tried) >= 3
