@@ -11,12 +11,15 @@ from itertools import pairwise
 import numpy as np
 from scipy import sparse
 from scipy.optimize import linprog
+from scipy.stats import f
 
+from tankcal.adjust import ALPHA
 from tankcal.inspection.levelling import LEAST_READINGS
 
 LEAST_IN_BULGE = 3  # readings: a narrower bulge is not told from one bad reading
 ON_BOTTOM = 3.0  # robust standard deviations: a reading that is farther off is on a bulge
 MOST_ENDS = 60  # readings of a profile that lines are laid through
+ROUNDING = 1e-24  # of the readings' sum of squares: what rounding leaves of them
 SIGNIFICANT = 2.0  # u that a bulge stands off
 
 
@@ -125,6 +128,83 @@ def on_the_bottom(r, z, sd):
     scale = 1.4826 * (1 + 5 / (len(r) - 2)) * medians[best]
     scale = np.maximum(scale, 0.0 if sd is None else sd)
     return deviations[best] <= np.maximum(ON_BOTTOM * scale, 1e-9)
+
+
+def beside_a_bulge(r, z, weights, squares, least_radius):
+    """Which readings of a profile that bends are beside a bulge or dent of it, or None.
+
+    A bulge is a run of readings inside of the bend that two straight lines need not explain. Of
+    all runs that one is taken which is least likely chance, by the F test of a mean shift of each
+    of its readings, and only where that is less likely than 0.1 % by the number of runs tried.
+
+    Parameters
+    ----------
+    r, z, weights : ndarray, shape (n,)
+        Rising radii, elevations, inverse standard deviations or ones.
+    squares : float
+        Weighed sum of squares that the best bent line through all readings leaves.
+    least_radius : float
+        The lines are to meet there or farther out.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,), or None
+        None: there is no bulge.
+
+    References
+    ----------
+    Cook R. D. & Weisberg S. (1982), Residuals and influence in regression, 2.2.2: mean shifts,
+    with Bonferroni's bound.
+
+    Examples
+    --------
+    >>> r = np.arange(16.0)
+    >>> z = np.maximum(r - 12, 0) * -0.05 + np.where((r > 5) & (r < 9), 0.04, 0.0)
+    >>> np.flatnonzero(~beside_a_bulge(r, z, np.ones(16), 0.002, 10.0)).tolist()
+    [6, 7, 8]
+    """
+    count = len(r)
+    most = min(count // 2, count - LEAST_READINGS)
+    ends = np.unique(np.linspace(0, count, min(count + 1, MOST_ENDS)).round().astype(int))
+    i, j = (ends[one] for one in np.triu_indices(len(ends), 1))
+    fits = (j - i >= LEAST_IN_BULGE) & (j - i <= most)
+    i, j = i[fits, None], j[fits, None]
+    outer = np.arange(LEAST_IN_BULGE, count - 1)  # the first reading outside of the bend
+    parts = _sums(r, z, weights)
+    one, two = _lines(parts[outer] - parts[j] + parts[i]), _lines(parts[-1] - parts[outer])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = (one[0] - two[0]) / (two[1] - one[1]) + r.mean()
+    inside = outer - (j - i)  # readings of the inner line
+    beyond = r[np.minimum(outer + 1, count - 1)]
+    meets = (x >= np.minimum(r[i], r[outer - 2])) & (x <= beyond) & (x >= least_radius)
+    allowed = (j <= outer) & (inside >= LEAST_IN_BULGE) & meets
+    if not allowed.any() or squares <= ROUNDING * np.sum((weights * z) ** 2):
+        return None
+    left = np.where(allowed, np.maximum(one[2] + two[2], 1e-9 * squares), np.inf).min(axis=1)
+    size, dof = j[:, 0] - i[:, 0], count - (j - i)[:, 0] - 4
+    gained = np.maximum(squares - left, 0.0)
+    chance = np.where(np.isfinite(left), f.logsf(gained / size / (left / dof), size, dof), 0.0)
+    best = int(np.lexsort((size, chance))[0])
+    if chance[best] > np.log(ALPHA / len(chance)):
+        return None
+    at = np.arange(count)
+    return (at < i[best]) | (at >= j[best])
+
+
+def _sums(r, z, weights):
+    """(n + 1, 6) sums of w2 (1, r, z, rr, rz, zz) over the readings before each, about the mean."""
+    r, z = r - r.mean(), z - z.mean()
+    columns = np.column_stack([np.ones(len(r)), r, z, r * r, r * z, z * z])
+    return np.concatenate([np.zeros((1, 6)), np.cumsum(columns * weights[:, None] ** 2, axis=0)])
+
+
+def _lines(sums):
+    """(level at 0, slope, sum of squares left) of the lines through readings of such sums."""
+    w, wr, wz, wrr, wrz, wzz = np.moveaxis(sums, -1, 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rr, rz, zz = wrr - wr * wr / w, wrz - wr * wz / w, wzz - wz * wz / w
+        slope = rz / rr
+        return (wz - slope * wr) / w, slope, np.maximum(zz - slope * rz, 0.0)
 
 
 def _line_of_least_deviations(r, z, flat):

@@ -15,7 +15,7 @@ from scipy.stats import chi2, f
 
 from tankcal.adjust import ALPHA
 from tankcal.gum.coverage import coverage_factor
-from tankcal.inspection.bulges import find_bulge
+from tankcal.inspection.bulges import beside_a_bulge, find_bulge
 from tankcal.inspection.figures import PROBABILITY, Figure
 from tankcal.inspection.levelling import LEAST_READINGS
 from tankcal.inspection.settlement_limits import largest_drop_mm
@@ -24,6 +24,7 @@ from tankcal.record.inspection import EdgeProfile, InspectionLimit
 
 FAR_FROM_SHELL_M = 0.3  # of the last reading: from there to the shell the line is carried on
 WIDEST_EDGE, WIDEST_EDGE_M = 0.3, 3.0  # of the radius, and in all
+MOST_BULGES = 3  # of a profile that are set aside
 ZONE = 3.0  # times that: the readings that the bent line goes through
 BEYOND_SHELL = 1.02  # of the shell's radius: farther out is another unit, or another tank
 
@@ -77,8 +78,9 @@ def bent_line(r, unknowns):
 def find_break(r, z, sd, shell_radius_m):
     """The break-over point of a profile, or None: its edge does not bend down (at 0.1 %).
 
-    Sought within `widest_edge` of the shell, by the readings within three times that. What the
-    bent line leaves of them counts where it is more than their standard deviations.
+    Sought within `widest_edge` of the shell, by the readings within three times that, but those
+    of a bulge: its flank is no break (`bulges.beside_a_bulge`). What the bent line leaves of them
+    counts where it is more than their standard deviations.
 
     Parameters
     ----------
@@ -96,13 +98,17 @@ def find_break(r, z, sd, shell_radius_m):
     near = r >= shell_radius_m - ZONE * widest
     r, z = r[near], z[near]
     weights = np.ones(len(r)) if sd is None else 1.0 / sd[near]
-    bends = [
-        one for one in _bends(r, z, weights) if one[1][3] >= shell_radius_m - widest
-    ] if len(r) >= LEAST_READINGS else []  # fmt: skip
-    if not bends:
+    best = _best_bend(r, z, weights, shell_radius_m - widest)
+    for _ in range(MOST_BULGES):
+        beside = best and beside_a_bulge(r, z, weights, best[0], shell_radius_m - widest)
+        if beside is None:
+            break
+        r, z, weights = r[beside], z[beside], weights[beside]
+        best = _best_bend(r, z, weights, shell_radius_m - widest)
+    if best is None:
         return None
+    squares, unknowns = best
     straight = _squares(np.column_stack([np.ones(len(r)), r]), z, weights)[1]
-    squares, unknowns = min(bends, key=lambda one: one[0])
     dof, gained = len(r) - 4, straight - squares
     if unknowns[2] >= unknowns[1] or gained <= 1e-9 * straight:
         return None
@@ -117,6 +123,14 @@ def find_break(r, z, sd, shell_radius_m):
     cofactor = factor * np.linalg.inv(jacobian.T @ jacobian)
     z_break, inner, outer, x = map(float, unknowns)
     return Break(x, z_break, inner, outer, cofactor, float(dof) if sd is None else np.inf)
+
+
+def _best_bend(r, z, weights, least_radius):
+    """(sum of squares, unknowns) of the best line that bends there or farther out, or None."""
+    if len(r) < LEAST_READINGS:
+        return None
+    bends = [one for one in _bends(r, z, weights) if one[1][3] >= least_radius]
+    return min(bends, key=lambda one: one[0], default=None)
 
 
 def widest_edge(shell_radius_m):

@@ -118,7 +118,7 @@ def named_rule(name, log):
 
 def tell_unknown_rule(name, rules, log):
     """Tell `log` that --rule names neither a file nor one of these rules."""
-    missing = message("no_rule_file_there", "no such file")
+    missing = message("no_rule_file_there", "no such file: {file}", file=name)
     _tell_unknown("--rule", None, None, name, missing, rules, log)
 
 

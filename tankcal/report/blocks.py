@@ -97,6 +97,11 @@ def paragraph(text):
     return Block({"kind": "paragraph", "text": _text(text)})
 
 
+def with_next(block):
+    """The same block, on the page on which the next one begins."""
+    return Block({**block.data, "with_next": True})
+
+
 def listing(items):
     """A list of sentences."""
     return Block({"kind": "list", "items": [_text(item) for item in items]})

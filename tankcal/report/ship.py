@@ -28,12 +28,24 @@ def _place(paper, xyz):
 
 
 def corrections(paper):
-    """A matrix for each list, so many trims wide: corrections and the largest U of each row."""
-    found = []
+    """A matrix for each list, so many trims wide: corrections and the largest U of each row.
+
+    Above them how often the tank becomes full beyond the end of the pipe, if anywhere.
+    """
+    found = _beyond_pipe(paper)
     for list_deg, cells in tables.by_list(paper.record):
         for start in range(0, len(cells), ACROSS):
             found.append(_matrix(paper, list_deg, cells[start : start + ACROSS]))
     return found
+
+
+def _beyond_pipe(paper):
+    length_m, count = tables.beyond_pipe(paper.record)
+    if not count:
+        return []
+    length = paper.number(length_m, "m", decimals=3)
+    cells = len(paper.record["ship"]["cells"])
+    return [paper.paragraph("ship_beyond_pipe", count=count, cells=cells, length=length)]
 
 
 def _matrix(paper, list_deg, cells):

@@ -113,6 +113,40 @@ def test_a_bulge_is_no_edge():
     assert_allclose(figures["bottom_bulge"].value, 28, atol=3)
 
 
+BULGES = {
+    "none": (8.25, 0.7, 0.0),
+    "beside the edge": (8.25, 0.7, 0.030),
+    "wide": (8.25, 1.0, 0.030),
+    "dent": (8.25, 1.0, -0.030),
+    "at the break": (9.0, 0.6, 0.030),
+}
+
+
+@pytest.mark.parametrize("bulge", BULGES)
+@pytest.mark.parametrize("sd_m", [0.0005, None])
+def test_a_bulge_beside_the_edge_does_not_move_its_break(bulge, sd_m):
+    """Truth: 60 mm over 1.5 m, planted. The flank of a bulge made 76 mm of it, a dent no edge."""
+    r, rng, held, drops = np.arange(0.5, 10.61, 0.25), np.random.default_rng(12), [], []
+    z = bent_line(r, (12, -0.008, -0.040, SHELL - 1.5))[0] + bump(r, *BULGES[bulge])
+    for _ in range(40):
+        (profile,), _, _ = judged(radial_line(z + rng.normal(0, 0.0005, len(r)), sd_m, r=r))
+        drops.append(profile.drop_mm)
+        held.append(abs(profile.drop_mm - 60) <= profile.U_mm)
+        assert profile.U_mm < 4
+    assert np.mean(held) >= 0.875  # 40 of 95 in 100: fewer are held by chance in 2 of 100
+    assert abs(np.mean(drops) - 60) < 0.3
+
+
+def test_a_small_drop_beside_a_bulge():
+    """Truth: 18 mm over 1 m, planted; a bulge 2.4 m from the shell made 52 mm over 3 m of it."""
+    r, rng = np.arange(0.5, 10.61, 0.25), np.random.default_rng(13)
+    z = bent_line(r, (12, -0.008, -0.018, SHELL - 1.0))[0] + bump(r, SHELL - 2.4, 0.7, 0.03)
+    (profile,), figures, _ = judged(radial_line(z + rng.normal(0, 0.0003, len(r)), 0.0003, r=r))
+    assert abs(profile.drop_mm - 18) <= profile.U_mm < 2
+    assert_allclose(profile.width_m, 1.0, atol=0.15)
+    assert_allclose(figures["bottom_bulge"].value, 30, atol=2)
+
+
 # ---- what is judged
 
 

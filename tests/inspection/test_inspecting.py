@@ -12,7 +12,7 @@ from tankcal.cli.asked_language import asked_of_record
 from tankcal.cli.showing import speak
 from tankcal.errors import InputError
 from tankcal.inspection.inspecting import Asked, inspect_files
-from tankcal.inspection.rules import parse_rule
+from tankcal.inspection.rules import find_rule, parse_rule
 from tankcal.job.tables import Log
 from tankcal.record import record_of, save
 from tankcal.record.inspection import CHECKS, plain_of_inspection
@@ -105,6 +105,13 @@ def test_a_rule_of_the_job_and_one_of_the_house(tmp_path):
     assert found.rule.verified
     asked = inspect_files(Asked(folder, rule="api_650"))  # what is asked for counts first
     assert asked.rule.file == "api_650.toml"
+
+
+def test_a_rule_that_is_not_there_is_named():
+    log = Log()
+    assert find_rule("houses/missing.toml", log) is None
+    (problem,) = log.problems
+    assert "houses/missing.toml" in str(problem)
 
 
 def test_every_problem_of_a_rule_is_told_at_once():

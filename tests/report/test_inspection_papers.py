@@ -13,13 +13,14 @@ import openpyxl
 import pytest
 from inspection_files import KINDS, TYPESET, few, hostile, inspection, plain, unjudged
 from invented_language import bracketed, without_brackets
-from paper_pages import lone_headings, pages_of, sparse_pages
+from paper_pages import LEAST_FILLED, filled, lone_headings, pages_of, sparse_pages
 from paper_words import texts_in, texts_of
 
 import tankcal
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.record.inspection import CHECKS, VERDICTS
+from tankcal.report import blocks
 from tankcal.report.inspection import (
     FILES,
     InspectionPaper,
@@ -30,10 +31,18 @@ from tankcal.report.inspection import (
     write_inspection,
 )
 from tankcal.report.inspection import paper as papers
-from tankcal.report.inspection.bottom import points as levelled_points
-from tankcal.report.inspection.bottom import settlement
-from tankcal.report.inspection.pages import checks, counts, limits, pages, reading, result
-from tankcal.report.inspection.wall import courses, welds
+from tankcal.report.inspection.bottom import edges, points, settlement
+from tankcal.report.inspection.pages import (
+    checks,
+    counts,
+    ending_together,
+    limits,
+    pages,
+    reading,
+    result,
+)
+from tankcal.report.inspection.wall import courses, departures, levels, welds
+from tankcal.report.pdf import pdf
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 
@@ -80,10 +89,10 @@ def test_an_epoch_says_plane_limits_and_verdicts():
     assert verdicts["Settlement: curvature"][1:4] == [
         f"+0.380{SPACE}mm/m²", f"0.090{SPACE}mm/m²", f"≤{SPACE}0.718{SPACE}mm/m²{SPACE}*",
     ]  # fmt: skip
-    points = {row[0]: row for row in table_of(levelled_points(paper), "2026: the points")}
+    of_point = {row[0]: row for row in table_of(points(paper), "2026: the points")}
     published = (-0.23, 1.38, -2.69, -1.22, 4.81, -0.46, -2.35, -0.24, 1.98, 0.87, -4.26, 1.42,
                  0.84, 1.01, 0.10, -0.96)  # fmt: skip
-    shown = [float(points[f"P{n}"][4].replace(MINUS, "-")) for n in range(1, 17)]
+    shown = [float(of_point[f"P{n}"][4].replace(MINUS, "-")) for n in range(1, 17)]
     assert shown == pytest.approx(published, abs=1e-9)
 
 
@@ -303,7 +312,29 @@ def test_pages_are_filled(written, kind):
     headings = set(load_words(LANGUAGE_OF[kind])["inspection"]["headings"].values())
     assert 2 <= len(shown) <= 10
     assert sparse_pages(shown) == []
+    assert filled(shown[-1]) >= LEAST_FILLED
     assert lone_headings(shown, headings) == []
+
+
+ENDINGS = {"courses": (departures, levels, courses), "edges": (edges,), "points": (points,)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_no_page_is_nearly_empty_whatever_comes_before(tmp_path, ending):
+    """Each document of one PDF has two lines more above than the one before."""
+    paper, made = InspectionPaper(plain()), []
+    end = [block for part in ENDINGS[ending] for block in part(paper)]
+    for above in range(10, 50, 2):
+        lines = [blocks.paragraph(f"line {n}") for n in range(above)]
+        made += [blocks.document(title="T", footer=""), *ending_together([*lines, *end])]
+    path = tmp_path / "made.pdf"
+    path.write_bytes(pdf([block.data for block in made]))
+    shown = pages_of(path)
+    headings = set(load_words("en")["inspection"]["headings"].values())
+    assert lone_headings(shown, headings) == []
+    after = [page for page in shown if not any(line.text.startswith("line ") for line in page)]
+    assert min(map(filled, after)) >= LEAST_FILLED
 
 
 @pytest.mark.slow

@@ -86,6 +86,26 @@ def test_papers_in_every_language(record, language):
     assert len(ship.facts(paper).data["items"]) == 5  # no contraction was given
 
 
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_tank_that_is_full_beyond_the_end_of_its_pipe(record, language):
+    """A pipe that ends below the highest soundings when full: told in words above the tables."""
+    soundings = sorted(cell["full_m"] for cell in record["ship"]["cells"])
+    bottom = record["ship"]["pipe_bottom_m"]
+    length = (soundings[-4] + soundings[-3]) / 2
+    cut = record["ship"] | {"pipe_top_m": [*bottom[:2], bottom[2] + length]}
+    beyond = sum(one > length + 0.0005 for one in soundings)
+    words = load_words(language)
+    paper = PlainPaper(words)
+    paper.record = translate_record(words, record | {"ship": cut})
+    (said, *matrices) = [one.data for one in ship.corrections(paper)]
+    assert beyond in (2, 3)
+    number = paper.number(length, "m", decimals=3)
+    assert said["text"] == words["texts"]["ship_beyond_pipe"].format(
+        count=beyond, cells=35, length=number
+    )
+    assert len(matrices) == 5
+
+
 @pytest.mark.slow
 def test_the_workbook_has_a_sheet(record, tmp_path):
     cells = cells_of_sheet(record, tmp_path / "capacity.xlsx", "Trim and list")

@@ -118,6 +118,6 @@ def edges(paper):
     return [
         paper.heading("edges"),
         paper.figure(figures.edges(paper), "edges_figure"),
+        blocks.with_next(paper.paragraph("edges")),
         paper.show(EDGES, found),
-        paper.paragraph("edges"),
     ]

@@ -9,27 +9,48 @@ from tankcal.report.inspection.wall import courses, departures, levels, welds
 from tankcal.report.saved_paper import bearable, shortened
 from tankcal.text.digits import NOTHING
 
+SHOWN = ("table", "columns_table", "figure")
+SHORT = 12  # rows of a table that page.typ keeps on one page
+
 # Verdicts, the gravest first.
 ORDER = ("failed", "guard_band", "not_determined", "no_limit", "passed")
 
 
 def pages(paper, folder=None):
     """The blocks of an InspectionPaper; `folder`: of the files that the PDF holds inside."""
-    return [
-        *paper.head(folder),
-        *result(paper),
-        *subject(paper),
-        *checks(paper),
-        *limits(paper),
-        *reading(paper),
-        *departures(paper),
-        *levels(paper),
-        *courses(paper),
-        *welds(paper),
-        *settlements(paper),
-        *edges(paper),
-        *points(paper),
-    ]
+    return ending_together(
+        [
+            *paper.head(folder),
+            *result(paper),
+            *subject(paper),
+            *checks(paper),
+            *limits(paper),
+            *reading(paper),
+            *departures(paper),
+            *levels(paper),
+            *courses(paper),
+            *welds(paper),
+            *settlements(paper),
+            *edges(paper),
+            *points(paper),
+        ]
+    )
+
+
+def ending_together(made):
+    """The blocks, the last table on one page with the table or figure before it.
+
+    Alone, its few rows would leave the last page nearly empty. A long table goes on from page to
+    page.
+    """
+    shown = [i for i, block in enumerate(made) if block.data["kind"] in SHOWN]
+    if len(shown) < 2:
+        return made
+    first, last = shown[-2:]
+    before = made[first].data
+    if len(before.get("rows", ())) > SHORT * before.get("across", 1):
+        return made
+    return [*made[:first], *map(blocks.with_next, made[first:last]), *made[last:]]
 
 
 def result(paper):

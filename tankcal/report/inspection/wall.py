@@ -53,8 +53,8 @@ def levels(paper):
     return [
         paper.heading("levels"),
         paper.figure(figures.levels(paper), "levels", factor=factor),
+        blocks.with_next(paper.paragraph("levels")),
         paper.show(LEVELS, rows),
-        paper.paragraph("levels"),
     ]
 
 
@@ -66,7 +66,11 @@ def courses(paper):
     said = paper.word("texts.courses")
     if any(kind in row for row in rows for kind in KINDS):
         said = f"{said} {paper.word('texts.courses_gaps')}"
-    return [paper.heading("courses"), paper.show(COURSES, rows), blocks.paragraph(said)]
+    return [
+        paper.heading("courses"),
+        blocks.with_next(blocks.paragraph(said)),
+        paper.show(COURSES, rows),
+    ]
 
 
 def welds(paper):

@@ -1,6 +1,10 @@
 """Tables of a tank of a ship: corrections of soundings, and the ends of what the pipe shows."""
 
+from math import dist
+
 from tankcal.report.tables.table import Column, Table
+
+ROUNDING_M = 0.0005  # that a sounding is printed to
 
 
 def _named(key, unit="", **more):
@@ -32,6 +36,14 @@ def _cell(one):
         "largest_m": one["correction_m"][worst],
         "largest_U_m": max((U for U in spread if U is not None), default=None),
     }
+
+
+def beyond_pipe(record):
+    """(length of the pipe in m, trims and lists at which the tank becomes full beyond its end)."""
+    ship = record["ship"]
+    length_m = dist(ship["pipe_bottom_m"], ship["pipe_top_m"])
+    beyond = [one["full_m"] for one in ship["cells"] if one["full_m"] > length_m + ROUNDING_M]
+    return length_m, len(beyond)
 
 
 def _filed(key, heading=None, unit=""):
