@@ -520,6 +520,64 @@ def test_feet_and_inches(tmp_path):
     )
 
 
+def of_sixteenths(count, unit=16, first=0):
+    """[(sixteenths or eighths, label f-ii-pp)], every one of them."""
+    return [
+        (k, f"{k // (12 * unit)}-{k // unit % 12:02d}-{k % unit:02d}")
+        for k in range(first, first + count)
+    ]
+
+
+def lint_parts(folder, rows, heading, unit=16):
+    text = [f"{label};{20 + 3.5 * k * 16 / unit:.1f}" for k, label in rows]
+    return lint_text(folder, "\n".join([f"{heading};Volume (L)", *text]) + "\n")
+
+
+@pytest.mark.parametrize(
+    ("heading", "unit"),
+    [
+        *(("Gauge (ft-in-16)", 16), ("Gauge ft-in-16ths", 16), ("Altura (p\u00e9s-pol-1/16)", 16)),
+        *(("Height, feet-inches-sixteenths", 16), ("dip_ft_in_8", 8), ("Altura (pies-pulg-8)", 8)),
+    ],
+)
+def test_feet_inches_and_parts_as_the_heading_names_them(heading, unit, tmp_path):
+    """The truth: 1/16 in is 0.0015875 m; the last of 401 rows is 400 parts above the first."""
+    report = lint_parts(tmp_path, of_sixteenths(401, unit), heading, unit)
+    assert found(report) == {}
+    assert f"step {0.0254 / unit:.6g} m" in report.summaries[0]
+    assert f"0 to {400 * 0.0254 / unit:.6g} m" in report.summaries[0]
+
+
+def test_sixteenths_that_no_heading_names(tmp_path):
+    """Parts of 8 and more are sixteenths, told; parts up to 7 may be eighths, and are refused."""
+    report = lint_parts(tmp_path, of_sixteenths(300, first=800), "Gauge")
+    assert "taken as feet, inches and sixteenths" in found(report)[2]
+    assert (report.errors, "step 0.0015875 m" in report.summaries[0]) == (0, True)
+    inches = of_sixteenths(40 * 16)[::16]
+    assert found(lint_parts(tmp_path, inches, "Gauge")) == {}
+    with pytest.raises(InputError, match="row 2: found 0-00-01, and no part of an inch over 7"):
+        lint_parts(tmp_path, of_sixteenths(300, 8), "Gauge")
+
+
+@pytest.mark.parametrize("wrong", ["0-12-03", "0-03-16", "0-03", "x-03-03", "0.3"])
+def test_a_height_of_another_shape_among_sixteenths_is_told(wrong, tmp_path):
+    rows = of_sixteenths(300)
+    rows[51] = (51, wrong)
+    report = lint_parts(tmp_path, rows, "Gauge ft-in-16")
+    assert f"found '{wrong}'; expected feet, inches up to 11" in found(report)[53]
+    assert report.errors
+
+
+@pytest.mark.parametrize("label", ["{}-{} {}/16", "{}-{:02d}-{}/16"])
+def test_feet_and_inches_with_dashes(label, tmp_path):
+    rows = [(k, label.format(k // 192, k // 16 % 12, k % 16)) for k in range(400)]
+    rows = [(k, text.removesuffix(" 0/16").removesuffix("-0/16")) for k, text in rows]
+    report = lint_parts(tmp_path, rows, "Gauge")
+    assert (found(report), "step 0.0015875 m" in report.summaries[0]) == ({}, True)
+    assert lint_parts(tmp_path, rows[::16], "Gauge (ft-in)").errors == 0
+    assert lint_parts(tmp_path, rows[::16], "Gauge").errors  # 0-3: nothing says feet
+
+
 def test_ullage_and_tables_from_the_top_down(tmp_path):
     text = "Ullage (m),Volume (L)\n" + pairs(",", height=lambda h: f"{9.8 - h / 100:.2f}")
     assert found(lint_text(tmp_path, text, nominal=Nominal(height_m=9.5))) == {}
