@@ -578,6 +578,36 @@ def test_feet_and_inches_with_dashes(label, tmp_path):
     assert lint_parts(tmp_path, rows[::16], "Gauge").errors  # 0-3: nothing says feet
 
 
+def test_a_file_of_western_windows_is_read_and_told(tmp_path):
+    """As Excel of Brazil saves: its letters are no UTF-8; a blank between thousands is 0xa0."""
+    text = "Tanque n\u00ba 3\nR\u00e9gua \u2013 n\u00edvel (cm);Volume (m\u00b3)\n"
+    text += "".join(f"{k};{v:,}\n".replace(",", "\u00a0") for k, v in zip(CM, LITRES, strict=True))
+    path = tmp_path / "table.csv"
+    path.write_bytes(text.replace("m\u00b3", "L").encode("cp1252"))
+    report = lint(path)
+    assert "warning: not UTF-8: read with the letters of Windows-1252" in found(report)[None]
+    assert (report.errors, f"total {LITRES[-1] / 1000:.9g} m3" in report.summaries[0]) == (0, True)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        *(
+            b"\x89GIF\x01\x02\xe9",
+            b"\x00\xe9",
+            b"height_m,volume_m3\n0,\x81\n",
+            b"\xef\xbb\xbf\xe9",
+        ),
+        *(bytes(range(256)), np.random.default_rng(1).bytes(3000).replace(b"\0", b"")),
+    ],
+)
+def test_a_binary_file_stays_refused_in_one_line(data, tmp_path):
+    (tmp_path / "table.csv").write_bytes(data)
+    with pytest.raises(InputError) as caught:
+        lint(tmp_path / "table.csv")
+    assert len(caught.value.problems) == 1
+
+
 def test_ullage_and_tables_from_the_top_down(tmp_path):
     text = "Ullage (m),Volume (L)\n" + pairs(",", height=lambda h: f"{9.8 - h / 100:.2f}")
     assert found(lint_text(tmp_path, text, nominal=Nominal(height_m=9.5))) == {}
@@ -791,7 +821,7 @@ def test_cells_of_a_workbook(tmp_path):
         ("t.csv", b"", "empty"),
         ("t.csv", b"a,b\nx,y\n", "no table found"),
         ("t.csv", b"height_m,volume_m3\n", "no table found"),
-        ("t.csv", "Altura;Volume\n1;é".encode("latin-1"), "not UTF-8"),
+        ("t.csv", b"Altura;Volume\n1;\x81", "not UTF-8"),
         ("t.csv", b"height,volume\n0,01,1,5\n" + b"0,02,3,0\n" * 20, "write ; between the cells"),
         ("t.xlsx", b"PK\x03\x04" + b"\0" * 100, "not an Excel workbook"),
         ("t.xls", b"\xd0\xcf\x11\xe0" + b"\0" * 600, "old .xls"),
