@@ -119,6 +119,17 @@ def test_a_lying_tank(tmp_path, capsys):
     assert tankcal.load(out).tank.kind == "horizontal"
 
 
+def test_a_tilt_that_is_not_found_is_said_to_be_none(tmp_path, capsys):
+    """By slices, level: the fit ends at a tilt of 7e-10 whose u is infinite."""
+    dips = np.arange(0, 201, 2) / 100
+    lines = [f"{d:.2f},{1000 * v:.0f}" for d, v in zip(dips, lying(dips, 2.0, 6.0), strict=True)]
+    (tmp_path / "lying.csv").write_text("\n".join(["dip_m,volume_L", *lines]))
+    assert main(["read-table", str(tmp_path / "lying.csv"), "--kind", "horizontal"]) == 0
+    said = capsys.readouterr().out
+    assert "a tilt as one more unknown: none was found that fits better; up to 0.8 mm/m" in said
+    assert "lowers chi2" not in said
+
+
 def test_a_leaning_tank_that_is_dipped_near_its_low_end(tmp_path):
     """By slices: 8 mm/m over 9 m; the lowest liquid lies below the bottom at half the length."""
     dips = np.arange(0, 261, 2) / 100
