@@ -261,7 +261,11 @@ def _tidied(rows, found, about):
 
 
 def with_sure_fittings(rows, found, quantum_m3):
-    """The Fit without things whose volume is no more than its uncertainty, the least sure first."""
+    """The Fit without things whose volume is no more than its uncertainty, the least sure first.
+
+    One whose u is beyond it goes even where it explains the rows: what they have more in them is
+    told as such, not as a thing of any size.
+    """
     while found.state.fittings:
         things = found.state.fittings
         scale = scale_of_u(found, rows, quantum_m3)[found.state.layout["fittings"]]
@@ -269,7 +273,14 @@ def with_sure_fittings(rows, found, quantum_m3):
         sizes = np.abs([one.volume_m3 for one in things]) / sds
         worst = int(np.argmin(sizes))
         rest = things[:worst] + things[worst + 1 :]
-        again = tried(rows, replace(found.state, fittings=rest))
+        bare = replace(found.state, fittings=rest)
+        again = tried(rows, bare)
+        if not sizes[worst] >= 1:
+            again = again or tried(rows, replace(bare, free=bare.free - {"kinks", "zero"}))
+            if again is None:
+                break
+            found = again
+            continue
         rise = np.inf if again is None else again.chi2 - found.chi2
         limit = 2 * LEAST_GAIN if sizes[worst] < CRITICAL else LEAST_GAIN
         if limit < rise < DOUBTFUL_GAIN and quantum_m3 > 0:

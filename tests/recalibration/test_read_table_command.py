@@ -217,6 +217,24 @@ def test_without_courses(folder, capsys):
     assert "--courses" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("low", [None, 0, 2, 3])
+def test_seams_of_courses_that_do_not_fit_are_told(low, tmp_path, capsys):
+    """Simulated: five courses of 2.4 m; two neighbours are declared as 1.9 and 2.9 m."""
+    heights, plates = np.full(5, 2.4), np.array([0.012, 0.010, 0.008, 0.007, 0.006])
+    truth = SimulatedTank(6.5 - plates, heights, plates, density_kg_m3=900.0)
+    write_table(tmp_path / "old.csv", table_of(truth, step_m=0.1))
+    if low is not None:
+        heights[low : low + 2] = 1.9, 2.9
+    rows = [f"{k},{h},{1000 * t:g}" for k, (h, t) in enumerate(zip(heights, plates, strict=True))]
+    (tmp_path / "courses.csv").write_text("\n".join(["course,height_m,thickness_mm", *rows]))
+    assert run(tmp_path) == 0
+    said = capsys.readouterr()
+    assert ("do not fit the table: with seams at 2.40, 4.80, 7.20, 9.60 m" in said.err) == (
+        low is not None
+    )
+    assert ("nothing in the tank shows" in said.out) == (low is None)
+
+
 def test_courses_that_are_not_reached_are_left_out(folder):
     rows = (folder / "old.csv").read_text().splitlines()
     (folder / "old.csv").write_text("\n".join(rows[:380]))
