@@ -166,6 +166,20 @@ def test_the_job_asks_for_the_language_of_the_run(folder, capsys):
     assert tankcal.load(out).table.language == "pt-BR"
 
 
+@pytest.mark.parametrize("language", ["pt-BR", "es"])
+def test_the_job_says_nothing_in_english(language, tmp_path):
+    thing = ((2.5, 3.1, -0.2),)
+    write_table(tmp_path / "old.csv", table_of(tank(density_kg_m3=800.0, deadwood=thing)))
+    write_courses(tmp_path / "courses.csv")
+    assert run(tmp_path, "--out", str(tmp_path / "job"), "--language", language) == 0
+    said = (tmp_path / "job" / "job.toml").read_text(encoding="utf-8")
+    assert f'note = "{"lido" if language == "pt-BR" else "leído"} de old.csv"' in said
+    assert "\nobjeto-1,2.4998,3.1000," in (tmp_path / "job" / "deadwood.csv").read_text(
+        encoding="utf-8"
+    )
+    tankcal.load(tmp_path / "job")
+
+
 def test_u_of_the_former_table_is_that_of_all_radii(folder):
     """Closed form: U/V of 0.2 %, k = 2, is 0.05 % of the radius."""
     toml = folder / "former.toml"
