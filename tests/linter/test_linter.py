@@ -15,7 +15,13 @@ from linted_tables import DECIMALS, SHAPES, STEPS, WIDE, courses, lying, rows_of
 
 from tankcal.errors import InputError, TankcalError
 from tankcal.linter import Nominal, lint
-from tankcal.linter.examination import Rows, examine, leave_one_out, most_suspicious
+from tankcal.linter.examination import (
+    Rows,
+    _is_below_nothing,
+    examine,
+    leave_one_out,
+    most_suspicious,
+)
 from tankcal.linter.headings import heading_of
 from tankcal.linter.numbers import Style, read_number, style_of
 from tankcal.linter.volumes import suggestion
@@ -606,6 +612,33 @@ def test_a_binary_file_stays_refused_in_one_line(data, tmp_path):
     with pytest.raises(InputError) as caught:
         lint(tmp_path / "table.csv")
     assert len(caught.value.problems) == 1
+
+
+# diameter, length, tilt, and where the dip is from the low end
+LEANING = (2.6, 7.2, 0.01, 1.0), (2.6, 7.0, 0.008, 1.0), (2.7, 10.3, 0.005, 1.5)
+
+
+def leaning(diameter, length, tilt, place):
+    """Litres of a flat-ended lying tank by slices square to its axis, every 10 cm of the dip."""
+    x, litres = (np.arange(4000) + 0.5) / 4000 * length, []
+    for dip in np.arange(round(10 * diameter) + 1) / 10:
+        level = dip * np.hypot(1, tilt) - tilt * (x - place)
+        angle = np.arccos(np.clip(1 - 2 * level / diameter, -1, 1))
+        areas = diameter**2 / 4 * (angle - np.sin(2 * angle) / 2)
+        litres.append(1000 * length * areas.mean())
+    return litres
+
+
+@pytest.mark.parametrize("tank", LEANING)
+def test_a_leaning_tank_dipped_near_its_low_end_is_sound(tank, tmp_path):
+    rows = [f"{k / 10:.1f},{v:.0f}" for k, v in enumerate(leaning(*tank))]
+    assert lint_text(tmp_path, "\n".join(["height_m,volume_L", *rows]) + "\n").errors == 0
+
+
+def test_a_little_less_than_nothing_excuses_no_row():
+    """300 where about -1 is expected is wrong; 1 where -83 is expected is not; 0 never is."""
+    cases = (300.0, 301.0), (1.0, 84.0), (0.0, 5.0), (100.0, 60.0)
+    assert [_is_below_nothing(*one) for one in cases] == [False, True, True, False]
 
 
 def test_ullage_and_tables_from_the_top_down(tmp_path):
