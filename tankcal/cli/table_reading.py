@@ -124,7 +124,7 @@ def _of_solid(found):
     if "end_depth" in values:
         yield _size(message("read_depth", "depth of the ends"), values["end_depth"])
     yield _size(message("read_zero_of_solid", "dips are less than the depth by"), values["zero"])
-    if getattr(found, "tilted", None) is not None:
+    if hasattr(found, "tilted"):
         yield from _tilt(found)
     yield message(
         "read_left_solid", "left: {rms} L (rms)", rms=fixed(1000 * fit.rms_m3, 2, marks())
@@ -149,8 +149,16 @@ def _ends(found, fit):
 
 
 def _tilt(found):
-    tilt, u = (1000 * one for one in found.tilted["tilt"])
     least, largest = (1000 * one for one in found.tilt_size)
+    if found.tilted is None:
+        yield message(
+            "read_no_tilt",
+            "a tilt as one more unknown: none was found that fits better; up to {largest} mm/m "
+            "either way would fit as well",
+            largest=fixed(largest, 1, marks()),
+        )
+        return
+    tilt, u = (1000 * one for one in found.tilted["tilt"])
     if found.tilted is not found.best:
         yield message(
             "read_tilt",

@@ -219,11 +219,20 @@ def _mend(rows, best):
         return [
             Fault("row", row, row, size)
             for row, size in wrong.items()
-            if not (rows.volume[row] == 0 and size > 0)  # an empty tank above its bottom
+            if not _is_below_nothing(rows.volume[row], size)
         ]
     end = len(rows.height) if last is None else last + 1
     rows.volume[first:end] -= best.sizes[0]
     return [Fault(best.kind, first, end - 1, best.sizes[0])]
+
+
+def _is_below_nothing(volume, size):
+    """Whether an expected volume is so far below zero that the row is right: near the bottom.
+
+    An empty tank above its bottom, or one that leans: nothing is the nearer to what was found.
+    """
+    expected = volume - size
+    return volume >= 0 and expected < 0 and -expected > 0.5 * size
 
 
 def _merged(faults, count):

@@ -1,4 +1,4 @@
-"""Any file as grids of cells: CSV in UTF-8, an Excel workbook, text of a PDF, or a record."""
+"""Any file as grids of cells: CSV, an Excel workbook, text of a PDF, or a record."""
 
 import csv
 import json
@@ -15,6 +15,9 @@ from tankcal.messages import message
 from tankcal.record import FORMAT, version_of
 
 MOST_COLUMNS, MOST_LINES = MAX_COLUMNS, 200_000
+_NOT_OF_TEXT = re.compile(  # control characters, and the marks of UTF-16 and UTF-8
+    rb"[\0-\x08\x0b\x0e-\x1f\x7f]|\A(?:\xff\xfe|\xfe\xff|\xef\xbb\xbf)"
+)
 _BY_CERTAINTY = (";", "\t", ",")  # a comma may be a decimal mark
 
 
@@ -52,12 +55,33 @@ def read_grids(path, log):
         return _pdf(path, log)
     if data[:2] == b"PK" or data[:4] == b"\xd0\xcf\x11\xe0" or path.suffix.lower() == ".xlsx":
         return _workbook(path.name, data, log)
-    text = decode(path.name, data, log)
+    text = _text(path, data, log)
     if text is None:
         return ()
     if path.suffix.lower() == ".json" or text.lstrip()[:1] == "{":
         return _record(path.name, text, log)
     return _csv(path.name, text, log)
+
+
+def _text(path, data, log):
+    """Text of UTF-8, or as spreadsheets of western Windows save it; None after telling `log`."""
+    if path.suffix.lower() != ".json" and not _is_utf8(data) and not _NOT_OF_TEXT.search(data):
+        try:
+            text = data.decode("cp1252")
+        except UnicodeDecodeError:
+            return decode(path.name, data, log)
+        said = message("lint_cp1252", "not UTF-8: read with the letters of Windows-1252")
+        log.warning(path.name, said)
+        return text
+    return decode(path.name, data, log)
+
+
+def _is_utf8(data):
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 def _pdf(path, log):

@@ -28,6 +28,9 @@ _OF_SOMETHING_ELSE = re.compile("radius|raio|radio|area|input|entrada|height|alt
 _COVERAGE = re.compile(r"\bk ?= ?(\d{1,2}(?:[.,]\d{1,4})?)", re.ASCII)
 _BOUND = re.compile("from|to|de|a|ate|desde|hasta")  # of an interval of volumes
 _RATE = re.compile(r"/ ?(mm|cm|dm|m|in|ft|pol)\b")
+_FEET = re.compile("ft|foot|feet|pes|pies")
+_OF_INCH = re.compile(r"(?<![\d.,])(?:1/)?(8|16)(?![\d.,]|/)|(eighth|oitavo|octavo)|"
+                      r"(sixteenth|dezesseis ?avo|dieciseisavo)", re.ASCII)  # fmt: skip
 _PARTS = re.compile("proportional|proporciona|interpola|milimetrica")
 
 HEIGHT_UNITS_M = (
@@ -58,6 +61,11 @@ class Heading:
     text: str
     role: str
     unit: float | None
+
+    @property
+    def is_in_feet(self):
+        """Whether it names feet."""
+        return _any(_FEET, _words(self.text))
 
 
 @dataclass(frozen=True)
@@ -126,6 +134,14 @@ def is_unit(cell):
     words = _words(cell) if isinstance(cell, str) else []
     units = HEIGHT_UNITS_M + VOLUME_UNITS_M3
     return bool(words) and all(_unit(units, [word]) is not None for word in words)
+
+
+def parts_of_inch(text):
+    """8 or 16 where a heading of feet and inches names eighths or sixteenths, else None."""
+    found = _OF_INCH.search(_plain(text)) if _any(_FEET, _words(text)) else None
+    if found is None:
+        return None
+    return int(found[1]) if found[1] else 8 if found[2] else 16
 
 
 def announces_parts(cell):

@@ -7,7 +7,8 @@ pairs are read column by column or row by row, whichever lets the heights rise.
 from dataclasses import dataclass, field, replace
 from itertools import pairwise, zip_longest
 
-from tankcal.errors import HeightError, InputError, Problem
+from tankcal.errors import InputError, Problem
+from tankcal.linter.feet import feet_reader
 from tankcal.linter.headings import (
     Uncertainty,
     announces_parts,
@@ -17,7 +18,6 @@ from tankcal.linter.headings import (
     uncertainty_of,
 )
 from tankcal.linter.numbers import (
-    MOST_DECIMALS,
     Reading,
     has_digit,
     has_letter,
@@ -26,11 +26,8 @@ from tankcal.linter.numbers import (
     style_of,
 )
 from tankcal.messages import message
-from tankcal.tank.dips import parse_dip
 
 _FEW_SPLIT_ROWS = 5
-_FEET_DECIMALS = 4  # of a metre, in a label with decimals of an inch
-_FEET_MARKS = ("'", '"', "\u2032", "\u2033", "\u2019", "\u201d", "ft")
 
 
 @dataclass(frozen=True)
@@ -242,10 +239,11 @@ def _table(grid, blocks, numbers, log):
     if len(numbers) > 1:
         orders.append([one for page in cells for row in _by_row(page) for one in row])
     style = style_of([[one[3] for one in by_column], [one[4] for one in by_column]])
-    in_feet = sum(_is_in_feet(one[3]) for one in by_column) > len(by_column) / 2
+    first = blocks[0].pairs[numbers[0]]
+    heights, rows = [one[3] for one in by_column], [one[0] for one in by_column]
+    in_feet = feet_reader(grid.name, heights, first.height_heading, rows, log)
     orders = [[_entry(one, style, in_feet) for one in order] for order in orders]
     entries = min(orders, key=_turns)
-    first = blocks[0].pairs[numbers[0]]
     return Table(
         grid.name,
         tuple(entries),
@@ -326,21 +324,10 @@ def _by_row(page):
     return [[column[k] for column in page if k < len(column)] for k in range(longest)]
 
 
-def _is_in_feet(cell):
-    return isinstance(cell, str) and any(mark in cell for mark in _FEET_MARKS)
-
-
 def _entry(cells, style, in_feet):
     row, height_name, volume_name, height, volume, beside = cells
     volume = volume if isinstance(volume, Reading) else read_number(volume, style)
-    if in_feet:
-        try:
-            decimals = _FEET_DECIMALS if "." in str(height) else MOST_DECIMALS
-            height = Reading(parse_dip(str(height), "ft-in-16"), str(height), decimals)
-        except HeightError as error:
-            height = Reading(None, complaint=str(error))
-    else:
-        height = read_number(height, style)
+    height = in_feet(height) if in_feet else read_number(height, style)
     beside = {what: read_number(cell, style) for what, cell in beside.items()}
     return Entry(row, height_name, volume_name, height, volume, **beside)
 

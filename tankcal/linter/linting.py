@@ -281,6 +281,7 @@ def _tables(file, grids, sheet, log, choose=None):
         )
         raise InputError(Problem(file, expected))
     log.problems += told.problems
+    log.warnings += told.warnings
     return tables
 
 

@@ -14,7 +14,8 @@ from tankcal.linter.headings import heading_of, is_unit
 MOST_LINES_OF_PAGE = 1000  # row 4032: line 32 of page 4
 _CELL = re.compile(r"\S+(?:[ \t]\S+)*")
 _NUMBER = re.compile(r"[+-]?[\d.,'\u2019\u00a0\u2009\u202f ]*\d[\d.,'\u2019\u00a0\u2009\u202f ]*")
-_FEET = re.compile(r"\d+ ?(?:'|\u2032|\u2019|ft)[\d /.]*(?:\"|\u2033|\u201d|''|in)?")
+_FEET = re.compile(r"\d+ ?(?:'|\u2032|\u2019|ft)[\d /.]*(?:\"|\u2033|\u201d|''|in)?|"
+                   r"\d{1,3}-\d{1,2}(?:-\d{1,2}|[ -]\d{1,2}/\d{1,2})?")  # fmt: skip
 _GROUPED = re.compile(r"\d{1,3}(?: \d{3})+(?:[.,]\d+)?")
 _MARKS = "*\u2020\u2021"  # of a footnote
 _MOSTLY = 0.6

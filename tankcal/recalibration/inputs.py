@@ -1,7 +1,7 @@
 """What `tankcal compare` is given: two tables, what is declared of them, courses, a rule."""
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -66,6 +66,8 @@ def compare_files(asked) -> ComparisonFile:
     courses = None if asked.courses is None else _shell(asked.courses, log)
     rule = None if asked.rule is None else named_rule(asked.rule, log)
     log.stop_if_problems()
+    if former.name == new.name:
+        former, new = _with_folders((old, former), (recent, new))
     fingerprints = tuple(sha256(_rows_of(one).read_bytes()).hexdigest() for one in (old, recent))
     return compare(former, new, rule=rule, courses=courses, fingerprints=fingerprints)
 
@@ -87,6 +89,19 @@ def _table(source, declared, log):
     except InputError as error:
         log.problems += error.problems
         return path, None
+
+
+def _with_folders(*tables):
+    """Both FormerTables, named by as many of their folders as tell them apart."""
+    folders = [path.resolve().parent.parts for path, _ in tables]
+    for count in range(1, max(map(len, folders))):
+        first, second = ("/".join(parts[-count:]) for parts in folders)
+        if first != second:
+            return [
+                replace(table, name=f"{folder}/{table.name}")
+                for folder, (_, table) in zip((first, second), tables, strict=True)
+            ]
+    return [table for _, table in tables]
 
 
 def _rows_of(path):

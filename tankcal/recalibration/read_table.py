@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.errors import InputError, Problem, SolutionError, TankcalError
 from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.recalibration.read_courses import read_courses
@@ -18,6 +18,8 @@ from tankcal.recalibration.upright_geometry import STEEL_PA, read_upright
 
 FEWEST_ROWS = 8
 SOLIDS = "horizontal", "sphere"
+AS_GOOD, OTHER_PLACE_M = 1.05, 0.1  # of what is left; of seams that are not those declared
+LONG_M = 1.0  # of things in a tank
 ABOVE_M = 0.02  # that a table may go beyond its courses
 WORST_FIT = 5e-3  # of the highest volume, rms: rows that depart by more are of another tank
 LARGE_SHARE = 2e-3  # of the table, that a thing which may be a roof takes
@@ -271,8 +273,47 @@ def _read(former, courses, warnings, e_pa, bottom_m, seams_known):
     job = job_of_geometry(
         former, found, courses.names, u_common_m=u_common, e_pa=e_pa, tank_id=_tank_of(former)
     )
+    if seams_known:
+        warnings = (*warnings, *_other_seams(former, courses, found, e_pa, bottom_m))
     told = (*warnings, *_of_geometry(former, found, seams_known), *_of_job(former, u_common))
     return TableRead(former, found, courses.names, job, told)
+
+
+def _other_seams(former, courses, found, e_pa, bottom_m):
+    """What to say where seams elsewhere explain by fewer things what those declared leave over."""
+    declared = np.cumsum(found.heights_m)[:-1]
+    doubtful = [one for one in found.fittings if _may_be_seams(one, declared + found.zero_m.value)]
+    if found.seams_are == "found" or not (doubtful or found.roughness > 1):
+        return
+    try:
+        other = read_upright(
+            former,
+            _with_seams(former, courses).heights_m,
+            courses.thickness_m,
+            modulus_pa=e_pa,
+            lowest_m=bottom_m,
+            seams_known=False,
+        )
+    except TankcalError:  # no such seams: those declared stand
+        return
+    seams = np.cumsum(other.heights_m)[:-1]
+    is_simpler = len(other.fittings) < len(found.fittings) or found.roughness > other.roughness
+    is_as_good = other.rms_m3 <= AS_GOOD * max(found.rms_m3, found.expected_m3)
+    if is_simpler and is_as_good and np.any(abs(seams - declared) > OTHER_PLACE_M):
+        yield message(
+            "read_doubtful_seams",
+            "the seams of courses.csv ({declared} m above the bottom) do not fit the table: with "
+            "seams at {seams} m less is left over, or in the tank; check the heights of the "
+            "courses, what is told of things in the tank may be none",
+            declared=[f"{one:.2f}" for one in declared],
+            seams=[f"{one:.2f}" for one in seams],
+        )
+
+
+def _may_be_seams(thing, seams):
+    """Whether a thing is long, or ends at a declared seam: what seams elsewhere look like."""
+    ends = np.array([thing.bottom_m.value, thing.top_m.value])
+    return ends[1] - ends[0] > LONG_M or np.any(abs(ends[:, None] - seams) < OTHER_PLACE_M)
 
 
 def _u_common_m(former, found):

@@ -134,10 +134,10 @@ class LyingGeometry:
         {name of ends: chi-squared above the least, over the variance factor of the least}, in
         rising order: below `TOLD_APART` the rows do not tell them apart.
     tilted : SolidFit or None
-        The same ends with a tilt as one more unknown; None where no such solid fits. The zero
-        takes up nearly all of a tilt, and both of its signs fit alike (`SolidFit.mirrored`): this
-        is the one with the nearer zero. It is `best` itself where no level tank explains the rows
-        and this one does, to their rounding.
+        The same ends with a tilt as one more unknown; None where none is found that fits better
+        than a level tank, or nothing tells its size. The zero takes up nearly all of a tilt, and
+        both of its signs fit alike (`SolidFit.mirrored`): this is the one with the nearer zero. It
+        is `best` itself where no level tank explains the rows and this one does, to their rounding.
     tilt_gain : float
         By how much the tilt lowers chi-squared, as of `worse_by`.
     tilt_size : (float, float)
@@ -408,22 +408,33 @@ def _tilt(rows, all_rows, best, whole, dip_from_a_m):
     if not found:
         return None, 0.0, (0.0, LARGEST_TILT)
     near = min(found, key=lambda one: one.chi2)
+    level, is_best = fit(near.values, 0.0, True), near is best
+    if not is_best and not _is_told(near, best):
+        near = best
     limit = near.chi2 + NEAR * near.variance_factor
 
     def is_near(size):
-        one = fit(near.values, np.copysign(size, near.values[-1]), True)
+        sign = near.values[-1] if "tilt" in near.names else 1.0
+        one = fit(near.values, np.copysign(size, sign), True)
         return one is not None and one.chi2 < limit
 
-    level, size = fit(near.values, 0.0, True), abs(float(near.values[-1]))
+    tilted = whole if is_best else _again(all_rows, near, dip_from_a_m)
+    if "tilt" not in near.names or not (is_best or _is_told(tilted, whole)):
+        return None, 0.0, (0.0, _edge(is_near, 0.0, LARGEST_TILT))
+    size, u = abs(near["tilt"][0]), near["tilt"][1]
     gain = np.inf if level is None else (level.chi2 - near.chi2) / near.variance_factor
-    u = near["tilt"][1]
     if size > _SURE * u:
         sizes = (size - 2 * u, size + 2 * u)
     else:
         least = 0.0 if gain < NEAR else _edge(is_near, size, 0.0)
         sizes = (least, _edge(is_near, size, LARGEST_TILT))
-    tilted = whole if near is best else _again(all_rows, near, dip_from_a_m)
     return tilted, float(gain), sizes
+
+
+def _is_told(leaning, level):
+    """Whether a tilt fits better than none, and the rows determine its size."""
+    is_there = leaning is not None and leaning.chi2 <= level.chi2
+    return is_there and bool(np.isfinite(leaning["tilt"][1]))
 
 
 def _edge(is_near, inside, outside):

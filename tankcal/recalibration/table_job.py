@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tankcal.messages import message
 from tankcal.recalibration.solid_geometry import declared_sizes, declared_uncertainties
 
 USUAL_TEMPERATURE_C = 20.0
@@ -25,11 +26,14 @@ class JobOfTable:
         Of the radii, for radii_cov.npz.
     courses : tuple of str
         What it is of.
+    words : tuple of Message
+        What `texts` say in words, as it stands there: to be said in the language of the job.
     """
 
     texts: dict
     covariance_m2: np.ndarray
     courses: tuple[str, ...]
+    words: tuple = ()
 
 
 def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
@@ -48,6 +52,7 @@ def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
     """
     density = 0.0 if found.head == "without" else found.state.density_kg_m3
     zero, bottom = _bottom(former, found)
+    note = message("job_read_from", "read from {name}", name=str(former.name))
     settings = _settings(
         former,
         tank_id=tank_id,
@@ -58,7 +63,7 @@ def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
         source="table",
         u_common_m=u_common_m,
         e_pa=e_pa,
-        note=f"read from {former.name}",
+        note=note,
     )
     texts = {
         "job.toml": settings + _roof(former),
@@ -66,20 +71,25 @@ def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
     }
     if bottom is not None:
         texts["bottom.csv"] = _csv(("level_m", "volume_m3"), bottom, (5, 6))
+    names_of_things = [
+        message("job_thing", "thing-{number}", number=k) for k in range(1, len(found.fittings) + 1)
+    ]
     things = [
-        (f"thing-{k}", f"{max(one.bottom_m.value, 0):.4f}", f"{one.top_m.value:.4f}",
+        (name, f"{max(one.bottom_m.value, 0):.4f}", f"{one.top_m.value:.4f}",
          f"{one.volume_m3.value:.5f}", f"{one.volume_m3.u:.5f}")
-        for k, one in enumerate(found.fittings, 1)
+        for name, one in zip(names_of_things, found.fittings, strict=True)
     ]  # fmt: skip
     if things:
         heading = ("name", "bottom_m", "top_m", "volume_m3", "u_m3")
         texts["deadwood.csv"] = "\n".join(map(",".join, [heading, *things])) + "\n"
-    return JobOfTable(texts, found.covariance_m2, tuple(names))
+    words = (note, *names_of_things)
+    return JobOfTable(texts, found.covariance_m2, tuple(names), words)
 
 
 def job_of_record(former, radii, *, tank_id):
     """The `JobOfTable` of `RecordedRadii`."""
     job = former.record["job"]
+    note = message("job_radii_of", "radii of {name}", name=str(former.name))
     settings = _settings(
         former,
         tank_id=tank_id,
@@ -90,11 +100,11 @@ def job_of_record(former, radii, *, tank_id):
         source="record",
         u_common_m=0.0,
         e_pa=job["material"]["e_pa"],
-        note=f"radii of {former.name}",
+        note=note,
     )
     wall = _wall(radii.names, radii.heights_m, radii.thickness_m, radii.radii_m)
     return JobOfTable(
-        {"job.toml": settings + _roof(former), **wall}, radii.covariance_m2, radii.names
+        {"job.toml": settings + _roof(former), **wall}, radii.covariance_m2, radii.names, (note,)
     )
 
 

@@ -16,7 +16,13 @@ from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.recalibration.rounding import roughness, scale_of_u, sd_of_rows
 from tankcal.recalibration.table_fit import Rows, State, held_kinks, tried
-from tankcal.recalibration.upright_search import LEAST_GAIN, SAME_ZERO, search, with_sure_fittings
+from tankcal.recalibration.upright_search import (
+    LEAST_GAIN,
+    SAME_ZERO,
+    search,
+    with_sure_fittings,
+    without_phantoms,
+)
 
 STEEL_PA = 206e9
 START_DENSITY_KG_M3 = 500.0
@@ -219,7 +225,7 @@ def _geometry(former, found, rows, used, seams_known):
     found, other = _with_order(chosen, found)
     seams = found if "seams" in found.state.free else _free_seams(chosen, found)
     if seams is not None and (not seams_known or _are_elsewhere(found, seams)):
-        found = seams
+        found = seams = without_phantoms(chosen, seams, former.volume_quantum_m3)
     seams_are = "found" if "seams" in found.state.free else "declared"
     quantum = former.volume_quantum_m3
     scale = scale_of_u(found, chosen, quantum)
@@ -236,6 +242,7 @@ def _geometry(former, found, rows, used, seams_known):
         found, other = _with_usual_density(chosen, former, found), None
     if head == "without":
         found, other = dry, None
+    found = without_phantoms(chosen, found, quantum)
     scale = scale_of_u(found, chosen, quantum)
     u_seams = (
         seams.sd("seams") * scale_of_u(seams, chosen, quantum)[seams.state.layout["seams"]]

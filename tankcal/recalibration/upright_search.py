@@ -262,11 +262,10 @@ def _tidied(rows, found, about):
 
 def with_sure_fittings(rows, found, quantum_m3):
     """The Fit without things whose volume is no more than its uncertainty, the least sure first."""
+    found = without_phantoms(rows, found, quantum_m3)
     while found.state.fittings:
         things = found.state.fittings
-        scale = scale_of_u(found, rows, quantum_m3)[found.state.layout["fittings"]]
-        sds = (found.sd("fittings") * scale)[2::3]
-        sizes = np.abs([one.volume_m3 for one in things]) / sds
+        sizes = _sizes(rows, found, quantum_m3)
         worst = int(np.argmin(sizes))
         rest = things[:worst] + things[worst + 1 :]
         again = tried(rows, replace(found.state, fittings=rest))
@@ -278,6 +277,35 @@ def with_sure_fittings(rows, found, quantum_m3):
             break
         found = again
     return found
+
+
+def without_phantoms(rows, found, quantum_m3):
+    """The Fit without things whose u is beyond their volume.
+
+    They go even where they explain rows: what these have more in them is told as such, not as a
+    thing of any size. Seams that are free leave such things, where they take over a kink.
+    """
+    while found.state.fittings:
+        sizes = _sizes(rows, found, quantum_m3)
+        worst = int(np.argmin(sizes))
+        if sizes[worst] >= 1:
+            break
+        things = found.state.fittings
+        bare = replace(found.state, fittings=things[:worst] + things[worst + 1 :])
+        held = replace(bare, free=bare.free - {"kinks", "zero"})
+        again = tried(rows, bare) or tried(rows, held)
+        if again is None:
+            break
+        found = again
+    return found
+
+
+def _sizes(rows, found, quantum_m3):
+    """(things,) volumes over their u; 0 where that is not known."""
+    scale = scale_of_u(found, rows, quantum_m3)[found.state.layout["fittings"]]
+    sds = (found.sd("fittings") * scale)[2::3]
+    sizes = np.abs([one.volume_m3 for one in found.state.fittings]) / sds
+    return np.nan_to_num(sizes, nan=0.0)
 
 
 def _gain_by_chance(found, rows, quantum):

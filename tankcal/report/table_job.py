@@ -1,9 +1,13 @@
 """The folder of a job that was made of a former table."""
 
+import json
+import re
+
 import numpy as np
 
 from tankcal.report.folders import refuse_foreign, replaced
 from tankcal.text.languages import DEFAULT
+from tankcal.text.words import load_words, say
 
 SETTINGS = "job.toml"
 COVARIANCE = "radii_cov.npz"
@@ -26,7 +30,9 @@ def write_job(job, directory, language=DEFAULT):
     has_radii = job.covariance_m2 is not None
     names = [name for name in FILES if name in job.texts or (name == COVARIANCE and has_radii)]
     with replaced(directory) as folder:
+        words = load_words(language)
         for name, text in job.texts.items():
+            text = _said(text, job.words, words)
             if name == SETTINGS and language != DEFAULT:
                 text = text.replace("[table]\n", f'[table]\nlanguage = "{language}"\n', 1)
             (folder / name).write_text(text, encoding="utf-8")
@@ -37,3 +43,13 @@ def write_job(job, directory, language=DEFAULT):
                 courses=np.array(job.courses, dtype=str),
             )
     return names
+
+
+def _said(text, messages, words):
+    """A text of a file with its messages in the language of `words`."""
+    for one in messages:
+        english, own = (json.dumps(part, ensure_ascii=False)[1:-1] for part in
+                        (str(one), say(words, one)))  # fmt: skip
+        pattern = rf"(?<![\w-]){re.escape(english)}(?![\w-])"
+        text = re.sub(pattern, lambda _, own=own: own, text)
+    return text

@@ -15,7 +15,13 @@ from linted_tables import DECIMALS, SHAPES, STEPS, WIDE, courses, lying, rows_of
 
 from tankcal.errors import InputError, TankcalError
 from tankcal.linter import Nominal, lint
-from tankcal.linter.examination import Rows, examine, leave_one_out, most_suspicious
+from tankcal.linter.examination import (
+    Rows,
+    _is_below_nothing,
+    examine,
+    leave_one_out,
+    most_suspicious,
+)
 from tankcal.linter.headings import heading_of
 from tankcal.linter.numbers import Style, read_number, style_of
 from tankcal.linter.volumes import suggestion
@@ -520,6 +526,121 @@ def test_feet_and_inches(tmp_path):
     )
 
 
+def of_sixteenths(count, unit=16, first=0):
+    """[(sixteenths or eighths, label f-ii-pp)], every one of them."""
+    return [
+        (k, f"{k // (12 * unit)}-{k // unit % 12:02d}-{k % unit:02d}")
+        for k in range(first, first + count)
+    ]
+
+
+def lint_parts(folder, rows, heading, unit=16):
+    text = [f"{label};{20 + 3.5 * k * 16 / unit:.1f}" for k, label in rows]
+    return lint_text(folder, "\n".join([f"{heading};Volume (L)", *text]) + "\n")
+
+
+@pytest.mark.parametrize(
+    ("heading", "unit"),
+    [
+        *(("Gauge (ft-in-16)", 16), ("Gauge ft-in-16ths", 16), ("Altura (p\u00e9s-pol-1/16)", 16)),
+        *(("Height, feet-inches-sixteenths", 16), ("dip_ft_in_8", 8), ("Altura (pies-pulg-8)", 8)),
+    ],
+)
+def test_feet_inches_and_parts_as_the_heading_names_them(heading, unit, tmp_path):
+    """The truth: 1/16 in is 0.0015875 m; the last of 401 rows is 400 parts above the first."""
+    report = lint_parts(tmp_path, of_sixteenths(401, unit), heading, unit)
+    assert found(report) == {}
+    assert f"step {0.0254 / unit:.6g} m" in report.summaries[0]
+    assert f"0 to {400 * 0.0254 / unit:.6g} m" in report.summaries[0]
+
+
+def test_sixteenths_that_no_heading_names(tmp_path):
+    """Parts of 8 and more are sixteenths, told; parts up to 7 may be eighths, and are refused."""
+    report = lint_parts(tmp_path, of_sixteenths(300, first=800), "Gauge")
+    assert "taken as feet, inches and sixteenths" in found(report)[2]
+    assert (report.errors, "step 0.0015875 m" in report.summaries[0]) == (0, True)
+    inches = of_sixteenths(40 * 16)[::16]
+    assert found(lint_parts(tmp_path, inches, "Gauge")) == {}
+    with pytest.raises(InputError, match="row 2: found 0-00-01, and no part of an inch over 7"):
+        lint_parts(tmp_path, of_sixteenths(300, 8), "Gauge")
+
+
+@pytest.mark.parametrize("wrong", ["0-12-03", "0-03-16", "0-03", "x-03-03", "0.3"])
+def test_a_height_of_another_shape_among_sixteenths_is_told(wrong, tmp_path):
+    rows = of_sixteenths(300)
+    rows[51] = (51, wrong)
+    report = lint_parts(tmp_path, rows, "Gauge ft-in-16")
+    assert f"found '{wrong}'; expected feet, inches up to 11" in found(report)[53]
+    assert report.errors
+
+
+@pytest.mark.parametrize("label", ["{}-{} {}/16", "{}-{:02d}-{}/16"])
+def test_feet_and_inches_with_dashes(label, tmp_path):
+    rows = [(k, label.format(k // 192, k // 16 % 12, k % 16)) for k in range(400)]
+    rows = [(k, text.removesuffix(" 0/16").removesuffix("-0/16")) for k, text in rows]
+    report = lint_parts(tmp_path, rows, "Gauge")
+    assert (found(report), "step 0.0015875 m" in report.summaries[0]) == ({}, True)
+    assert lint_parts(tmp_path, rows[::16], "Gauge (ft-in)").errors == 0
+    assert lint_parts(tmp_path, rows[::16], "Gauge").errors  # 0-3: nothing says feet
+
+
+def test_a_file_of_western_windows_is_read_and_told(tmp_path):
+    """As Excel of Brazil saves: its letters are no UTF-8; a blank between thousands is 0xa0."""
+    text = "Tanque n\u00ba 3\nR\u00e9gua \u2013 n\u00edvel (cm);Volume (m\u00b3)\n"
+    text += "".join(f"{k};{v:,}\n".replace(",", "\u00a0") for k, v in zip(CM, LITRES, strict=True))
+    path = tmp_path / "table.csv"
+    path.write_bytes(text.replace("m\u00b3", "L").encode("cp1252"))
+    report = lint(path)
+    assert "warning: not UTF-8: read with the letters of Windows-1252" in found(report)[None]
+    assert (report.errors, f"total {LITRES[-1] / 1000:.9g} m3" in report.summaries[0]) == (0, True)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        *(
+            b"\x89GIF\x01\x02\xe9",
+            b"\x00\xe9",
+            b"height_m,volume_m3\n0,\x81\n",
+            b"\xef\xbb\xbf\xe9",
+        ),
+        *(bytes(range(256)), np.random.default_rng(1).bytes(3000).replace(b"\0", b"")),
+    ],
+)
+def test_a_binary_file_stays_refused_in_one_line(data, tmp_path):
+    (tmp_path / "table.csv").write_bytes(data)
+    with pytest.raises(InputError) as caught:
+        lint(tmp_path / "table.csv")
+    assert len(caught.value.problems) == 1
+
+
+# diameter, length, tilt, and where the dip is from the low end
+LEANING = (2.6, 7.2, 0.01, 1.0), (2.6, 7.0, 0.008, 1.0), (2.7, 10.3, 0.005, 1.5)
+
+
+def leaning(diameter, length, tilt, place):
+    """Litres of a flat-ended lying tank by slices square to its axis, every 10 cm of the dip."""
+    x, litres = (np.arange(4000) + 0.5) / 4000 * length, []
+    for dip in np.arange(round(10 * diameter) + 1) / 10:
+        level = dip * np.hypot(1, tilt) - tilt * (x - place)
+        angle = np.arccos(np.clip(1 - 2 * level / diameter, -1, 1))
+        areas = diameter**2 / 4 * (angle - np.sin(2 * angle) / 2)
+        litres.append(1000 * length * areas.mean())
+    return litres
+
+
+@pytest.mark.parametrize("tank", LEANING)
+def test_a_leaning_tank_dipped_near_its_low_end_is_sound(tank, tmp_path):
+    rows = [f"{k / 10:.1f},{v:.0f}" for k, v in enumerate(leaning(*tank))]
+    assert lint_text(tmp_path, "\n".join(["height_m,volume_L", *rows]) + "\n").errors == 0
+
+
+def test_a_little_less_than_nothing_excuses_no_row():
+    """300 where about -1 is expected is wrong; 1 where -83 is expected is not; 0 never is."""
+    cases = (300.0, 301.0), (1.0, 84.0), (0.0, 5.0), (100.0, 60.0)
+    assert [_is_below_nothing(*one) for one in cases] == [False, True, True, False]
+
+
 def test_ullage_and_tables_from_the_top_down(tmp_path):
     text = "Ullage (m),Volume (L)\n" + pairs(",", height=lambda h: f"{9.8 - h / 100:.2f}")
     assert found(lint_text(tmp_path, text, nominal=Nominal(height_m=9.5))) == {}
@@ -733,7 +854,7 @@ def test_cells_of_a_workbook(tmp_path):
         ("t.csv", b"", "empty"),
         ("t.csv", b"a,b\nx,y\n", "no table found"),
         ("t.csv", b"height_m,volume_m3\n", "no table found"),
-        ("t.csv", "Altura;Volume\n1;é".encode("latin-1"), "not UTF-8"),
+        ("t.csv", b"Altura;Volume\n1;\x81", "not UTF-8"),
         ("t.csv", b"height,volume\n0,01,1,5\n" + b"0,02,3,0\n" * 20, "write ; between the cells"),
         ("t.xlsx", b"PK\x03\x04" + b"\0" * 100, "not an Excel workbook"),
         ("t.xls", b"\xd0\xcf\x11\xe0" + b"\0" * 600, "old .xls"),

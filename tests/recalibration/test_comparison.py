@@ -171,6 +171,22 @@ def test_tables_of_files(tmp_path):
     assert found.courses[0].d_m == pytest.approx(0.0005, abs=5e-6)
 
 
+def test_tables_of_the_same_name_are_told_apart_by_their_folders(tmp_path):
+    asked = write_tables(tmp_path)
+    paths = []
+    for name, kind in (("old", "vertical"), ("new", "sphere")):
+        folder = tmp_path / name / "results"
+        folder.mkdir(parents=True)
+        (folder / "table.csv").write_text((tmp_path / f"{name}.csv").read_text())
+        (folder / "former.toml").write_text(f'[former]\nfile = "table.csv"\nkind = "{kind}"\n')
+        paths.append(folder / "former.toml")
+    with pytest.raises(InputError) as caught:
+        compare_files(replace(asked, old=paths[0], new=paths[1], former=None, new_former=None))
+    said = str(caught.value)
+    assert said.startswith("new/results/table.csv: ")
+    assert "but old/results/table.csv is of a vertical one" in said
+
+
 def test_courses_with_decimal_commas(tmp_path):
     commas = COURSES_CSV.replace(",", ";").replace(".", ",")
     asked = write_tables(tmp_path, **{"courses.csv": commas})

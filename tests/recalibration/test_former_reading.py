@@ -126,6 +126,22 @@ def test_feet_and_inches(tmp_path):
     assert former.volume_m3[1] == pytest.approx(10.5 * 0.158987294928)
 
 
+@pytest.mark.parametrize("kind", ["parts", pytest.param("pdf", marks=pytest.mark.slow)])
+def test_feet_inches_and_sixteenths(kind, tmp_path):
+    rows = [(f"{k // 192}-{k // 16 % 12:02d}-{k % 16:02d}", f"{10 * k}.5") for k in range(120)]
+    path = tmp_path / "old.csv"
+    if kind == "pdf":
+        words = [(50, 770, "Gauge ft-in-16"), (200, 770, "Volume, bbl")]
+        for k, row in enumerate(rows[:60]):
+            words += [(50, 755 - 11 * k, row[0]), (200, 755 - 11 * k, row[1])]
+        path, rows = pdf_of([words], path.with_suffix(".pdf")), rows[:60]
+    else:
+        write(path, "Gauge ft-in-16,bbl", rows)
+    former = read_former(path)
+    assert former.height_m == pytest.approx(0.0015875 * np.arange(len(rows)), abs=1e-12)
+    assert former.volume_m3[1] == pytest.approx(10.5 * 0.158987294928)
+
+
 @pytest.mark.parametrize(
     ("digit", "factor"), [(1, 0.001), (2, 0.002), (5, 0.005), (10, 0.01), (100, 0.1)]
 )

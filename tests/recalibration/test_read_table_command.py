@@ -119,6 +119,17 @@ def test_a_lying_tank(tmp_path, capsys):
     assert tankcal.load(out).tank.kind == "horizontal"
 
 
+def test_a_tilt_that_is_not_found_is_said_to_be_none(tmp_path, capsys):
+    """By slices, level: the fit ends at a tilt of 7e-10 whose u is infinite."""
+    dips = np.arange(0, 201, 2) / 100
+    lines = [f"{d:.2f},{1000 * v:.0f}" for d, v in zip(dips, lying(dips, 2.0, 6.0), strict=True)]
+    (tmp_path / "lying.csv").write_text("\n".join(["dip_m,volume_L", *lines]))
+    assert main(["read-table", str(tmp_path / "lying.csv"), "--kind", "horizontal"]) == 0
+    said = capsys.readouterr().out
+    assert "a tilt as one more unknown: none was found that fits better; up to 0.8 mm/m" in said
+    assert "lowers chi2" not in said
+
+
 def test_a_leaning_tank_that_is_dipped_near_its_low_end(tmp_path):
     """By slices: 8 mm/m over 9 m; the lowest liquid lies below the bottom at half the length."""
     dips = np.arange(0, 261, 2) / 100
@@ -153,6 +164,20 @@ def test_the_job_asks_for_the_language_of_the_run(folder, capsys):
     out = folder / "job"
     assert run(folder, "--out", str(out), "--language", "pt-BR") == 0
     assert tankcal.load(out).table.language == "pt-BR"
+
+
+@pytest.mark.parametrize("language", ["pt-BR", "es"])
+def test_the_job_says_nothing_in_english(language, tmp_path):
+    thing = ((2.5, 3.1, -0.2),)
+    write_table(tmp_path / "old.csv", table_of(tank(density_kg_m3=800.0, deadwood=thing)))
+    write_courses(tmp_path / "courses.csv")
+    assert run(tmp_path, "--out", str(tmp_path / "job"), "--language", language) == 0
+    said = (tmp_path / "job" / "job.toml").read_text(encoding="utf-8")
+    assert f'note = "{"lido" if language == "pt-BR" else "leído"} de old.csv"' in said
+    assert "\nobjeto-1,2.4998,3.1000," in (tmp_path / "job" / "deadwood.csv").read_text(
+        encoding="utf-8"
+    )
+    tankcal.load(tmp_path / "job")
 
 
 def test_u_of_the_former_table_is_that_of_all_radii(folder):
@@ -204,6 +229,24 @@ def test_bad_input_is_told_in_a_line(folder, capsys, name, content, said):
 def test_without_courses(folder, capsys):
     assert main(["read-table", str(folder / "old.csv")]) == 2
     assert "--courses" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("low", [None, 0, 2, 3])
+def test_seams_of_courses_that_do_not_fit_are_told(low, tmp_path, capsys):
+    """Simulated: five courses of 2.4 m; two neighbours are declared as 1.9 and 2.9 m."""
+    heights, plates = np.full(5, 2.4), np.array([0.012, 0.010, 0.008, 0.007, 0.006])
+    truth = SimulatedTank(6.5 - plates, heights, plates, density_kg_m3=900.0)
+    write_table(tmp_path / "old.csv", table_of(truth, step_m=0.1))
+    if low is not None:
+        heights[low : low + 2] = 1.9, 2.9
+    rows = [f"{k},{h},{1000 * t:g}" for k, (h, t) in enumerate(zip(heights, plates, strict=True))]
+    (tmp_path / "courses.csv").write_text("\n".join(["course,height_m,thickness_mm", *rows]))
+    assert run(tmp_path) == 0
+    said = capsys.readouterr()
+    assert ("do not fit the table: with seams at 2.40, 4.80, 7.20, 9.60 m" in said.err) == (
+        low is not None
+    )
+    assert ("nothing in the tank shows" in said.out) == (low is None)
 
 
 def test_courses_that_are_not_reached_are_left_out(folder):

@@ -16,8 +16,9 @@ from tankcal.recalibration.fittings import Fitting, find_fittings, in_other_pair
 from tankcal.recalibration.former import FormerRoof, FormerTable
 from tankcal.recalibration.rounding import sd_of_rows
 from tankcal.recalibration.seams import find_seams
-from tankcal.recalibration.table_fit import State
+from tankcal.recalibration.table_fit import Rows, State
 from tankcal.recalibration.upright_geometry import read_upright
+from tankcal.recalibration.upright_search import without_phantoms
 from tankcal.recalibration.upright_shell import Rings
 from tankcal.recalibration.zero import find_zeros
 
@@ -189,6 +190,18 @@ def test_kinks_in_other_pairs():
     again = in_other_pairs(crossed, 0.016, 0.03)
     assert_allclose([(f.bottom_m, f.top_m) for f in again], [(1.0, 1.5), (2.0, 2.2)])
     assert_allclose([f.volume_m3 for f in again], [-0.5, -0.2])
+
+
+def test_a_thing_whose_u_is_beyond_it_is_none():
+    """Simulated without things: one that was put beside free seams has a u of any size."""
+    former = table_of(SimulatedTank(6.5 - PLATES, HEIGHTS, PLATES, density_kg_m3=850.0))
+    rows = Rows(former.height_m, former.volume_m3, sd_of_rows(former))
+    state = read_upright(former, HEIGHTS, PLATES).state
+    phantom = Fitting(1.85, 2.9, -0.0002)
+    found = rows.adjust(replace(state, fittings=(phantom,), free=state.free | {"seams"} - {"zero"}))
+    left = without_phantoms(rows, found, 0.001)
+    assert (len(found.state.fittings), left.state.fittings) == (1, ())
+    assert abs(found.state.fittings[0].volume_m3) < found.sd("fittings")[2]
 
 
 def test_a_thing_that_takes_room_is_preferred():

@@ -328,3 +328,12 @@ def test_a_damaged_comparison_is_told_in_one_line(tmp_path, change):
         rebuild(path, tmp_path / "out")
     assert len(told.value.problems) == 1
     assert [one.name for one in tmp_path.iterdir()] == ["comparison.json"]
+
+
+@pytest.mark.parametrize("language", ["pt-BR", "es"])
+def test_clauses_of_a_shipped_rule_are_in_the_language(language):
+    paper = ComparisonPaper(plain(), language)
+    said = {one["clause"] for one in (*paper.found["legal"], *paper.found["ages"])}
+    known = paper.words["rule_texts"]["france_2020_recalibration"]["clauses"]
+    assert said & set(known.values())
+    assert not said & set(known)

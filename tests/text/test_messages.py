@@ -12,7 +12,7 @@ from job_builder import write_job
 from messages_told import lines
 
 import tankcal
-from tankcal.job.rule_files import shipped_names
+from tankcal.job.rule_files import shipped_names, shipped_rule
 from tankcal.messages import as_plain, fields_of, join_with_and, list_some, message
 from tankcal.record import record_of
 from tankcal.record.plain_data import to_plain
@@ -92,7 +92,11 @@ def test_language_has_every_message_with_its_values(language):
 def test_language_has_texts_of_every_shipped_rule(language):
     texts = load_words(language)["rule_texts"]
     assert set(texts) == set(shipped_names())
-    assert all(set(one) == {"name", "source", "remark"} for one in texts.values())
+    assert all(set(one) - {"clauses"} == {"name", "source", "remark"} for one in texts.values())
+    for name, one in texts.items():
+        rule = shipped_rule(name)
+        limits = (*rule.deviation, *rule.reference_height, *rule.periods)
+        assert set(one.get("clauses", ())) <= {limit.clause for limit in limits}
 
 
 # ---- one message

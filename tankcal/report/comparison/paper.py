@@ -42,16 +42,20 @@ class ComparisonPaper(SavedPaper):
         super().__init__(words_with_part(load_words(language or DEFAULT), "comparison"))
         found = COMPARISON.migrated(found, COMPARISON.file)
         self.saved = found
-        self.found = found | {"rule": self._rule(found["rule"])}
+        texts = self._texts(found["rule"])
+        own = {key: value for key, value in texts.items() if key != "clauses"}
+        self.found = found | {"rule": found["rule"] and found["rule"] | own}
+        for key in ("legal", "ages"):
+            self.found[key] = [_with_clause(one, texts.get("clauses", {})) for one in found[key]]
         self.letterhead = letterhead.data() if letterhead else None
 
-    def _rule(self, rule):
-        """The rule with the texts of a shipped one; those of a laboratory's own file stay."""
+    def _texts(self, rule):
+        """The texts of a shipped rule; none of a laboratory's own file, whose own stay."""
         name = (rule or {}).get("file", "").removesuffix(".toml")
         texts = self.words.get("rule_texts", {}).get(name)
         if texts is None or name not in shipped_names():
-            return rule
-        return rule | texts if shipped_rule(name).name == rule["name"] else rule
+            return {}
+        return texts if shipped_rule(name).name == rule["name"] else {}
 
     def subject(self):
         """What the papers are about: the tank, or the file of the former table."""
@@ -123,3 +127,8 @@ def _variant(values):
     if values.get("c_limit") is not None:
         return "_with_limit"
     return "_for_lack" if values.get("lacking") else ""
+
+
+def _with_clause(one, clauses):
+    """A number of the rule with its clause in the reader's language; others are quoted as is."""
+    return one | {"clause": clauses.get(one["clause"], one["clause"])}

@@ -19,6 +19,7 @@ from tankcal.tank.dips.straightness import (
 )
 from tankcal.tank.dips.units import (
     HEIGHT_STEPS_M,
+    INCHES_PER_FOOT,
     METRES_PER_INCH,
     TABLE_DECIMALS,
     VOLUME_UNITS_M3,
@@ -30,6 +31,7 @@ from tankcal.tank.dips.units import (
 
 __all__ = [
     "HEIGHT_STEPS_M",
+    "INCHES_PER_FOOT",
     "LADDERS_M",
     "METRES_PER_INCH",
     "MOST_ROWS",

@@ -1,0 +1,102 @@
+"""Heights in feet and inches: which of the ways to write them a column keeps to.
+
+    5' 3 3/16", 5 ft 3 3/16 in   marks say what is what
+    5-3 3/16, 5-03-3/16, 5-3     feet and inches, a fraction where there is one
+    5-03-03                      feet, inches, and eighths or sixteenths of an inch
+
+The last part of the last one is of the unit that the heading names (ft-in-16, ft-in-8ths). Where
+the heading names none, a part of 8 or more somewhere in the column can only be a sixteenth; a
+column of parts up to 7 may be either, and is asked about.
+"""
+
+import re
+from fractions import Fraction
+
+from tankcal.errors import HeightError, InputError, Problem
+from tankcal.job.tables import shown
+from tankcal.linter.headings import parts_of_inch
+from tankcal.linter.numbers import MOST_DECIMALS, Reading, has_digit
+from tankcal.messages import message
+from tankcal.tank.dips import INCHES_PER_FOOT, METRES_PER_INCH, parse_dip
+
+_FEET_DECIMALS = 4  # of a metre, in a label with decimals of an inch
+_MARKS = ("'", '"', "\u2032", "\u2033", "\u2019", "\u201d", "ft")
+_FRACTION = re.compile(r"\d{1,3}-\d{1,2}(?:[ -]+\d{1,2}/\d{1,2})?", re.ASCII)
+_PARTS = re.compile(r"(\d{1,3})-(\d{1,2})-(\d{1,2})", re.ASCII)
+_EIGHTHS, _SIXTEENTHS = 8, 16
+
+
+def feet_reader(name, cells, heading, rows, log):
+    """Function of a cell that gives its `Reading` in metres; None for a column of plain numbers.
+
+    name     of the table, for messages
+    cells    of the column of heights
+    heading  of that column
+    rows     where the cells stand in the file
+    log      told where sixteenths are known by the parts alone
+
+    Raises InputError where parts of an inch may be eighths or sixteenths.
+    """
+    cells = [(cell, row) for cell, row in zip(cells, rows, strict=True) if has_digit(cell)]
+    texts = [cell.strip() if isinstance(cell, str) else "" for cell, _ in cells]
+    most, said = len(texts) / 2, parts_of_inch(heading.text)
+    in_parts = [_PARTS.fullmatch(text) for text in texts]
+    if sum(one is not None for one in in_parts) > most:
+        unit = said or _parts_by_shape(name, in_parts, [row for _, row in cells], log)
+        return lambda cell: _read_parts(cell, unit)
+    in_fractions = sum(_FRACTION.fullmatch(text) is not None for text in texts)
+    is_told = heading.is_in_feet or any("/" in text for text in texts)
+    marked = sum(any(mark in text for mark in _MARKS) for text in texts)
+    if marked > most or (is_told and in_fractions + marked > most):
+        return _read_marks
+    return None
+
+
+def _parts_by_shape(name, in_parts, rows, log):
+    """16, or any where no part says anything; InputError where eighths are as likely."""
+    parts = {int(one[3]): row for one, row in zip(in_parts, rows, strict=True) if one}
+    first = next(row for one, row in zip(in_parts, rows, strict=True) if one)
+    if max(parts) == 0:
+        return _SIXTEENTHS
+    if max(parts) < _EIGHTHS:
+        found = next(one[0] for one in in_parts if one and int(one[3]))
+        text = message(
+            "lint_parts_of_inch",
+            "found {found}, and no part of an inch over 7; expected a heading that says ft-in-8 or "
+            "ft-in-16",
+            found=found,
+        )
+        raise InputError(Problem(name, text, first))
+    text = message(
+        "lint_by_sixteenths",
+        "heights such as {found} are taken as feet, inches and sixteenths: the heading does not "
+        "say so",
+        found=next(one[0] for one in in_parts if one and int(one[3]) >= _EIGHTHS),
+    )
+    log.warning(name, text, first)
+    return _SIXTEENTHS
+
+
+def _read_parts(cell, unit):
+    found = _PARTS.fullmatch(cell.strip()) if isinstance(cell, str) else None
+    feet, inches, parts = map(int, found.groups()) if found else (0, INCHES_PER_FOOT, 0)
+    if inches >= INCHES_PER_FOOT or parts >= unit:
+        text = message(
+            "lint_no_parts_of_inch",
+            "found {found}; expected feet, inches up to 11 and parts of an inch up to {most}, such "
+            "as 5-03-{most:02d}",
+            found=shown(cell),
+            most=unit - 1,
+        )
+        return Reading(None, complaint=text)
+    inches = INCHES_PER_FOOT * feet + inches + Fraction(parts, unit)
+    return Reading(float(inches * METRES_PER_INCH), cell.strip(), MOST_DECIMALS)
+
+
+def _read_marks(cell):
+    text = str(cell)
+    try:
+        decimals = _FEET_DECIMALS if "." in text else MOST_DECIMALS
+        return Reading(parse_dip(text, "ft-in-16"), text, decimals)
+    except HeightError as error:
+        return Reading(None, complaint=error.args[0])
