@@ -80,6 +80,7 @@ def test_uncertainty_of_the_drop_by_simulation(sd_m):
     assert abs(np.mean(drops) - 69) < 0.3
 
 
+@pytest.mark.slow
 def test_a_straight_bottom_has_no_break():
     """Noise alone is taken for a bend in one of a hundred or less."""
     rng, found = np.random.default_rng(1), 0
@@ -214,6 +215,7 @@ def test_the_steeper_of_two_bulges_is_nearer_its_limit():
     assert_allclose(find_bulge(r, z, None).radius_m, 8.0, atol=0.01)
 
 
+@pytest.mark.slow
 def test_uncertainty_of_a_bulge_by_simulation():
     """Truth: the planted height, read where it is highest; 95 % within U, a biased pick apart."""
     r, rng, held = np.arange(0.0, 8.0, 0.2), np.random.default_rng(2), []

@@ -318,6 +318,7 @@ def test_gap_that_is_too_uncertain(shell, scanned, found):  # u over a quarter o
     assert banding == found.figures[1]
 
 
+@pytest.mark.slow
 def test_weld_that_is_hidden_is_not_passed():  # property: the figure says so
     flat = PeakedShell(peaks=[Peak(0, 1.5, 0.0, 0.1), Peak(0, 4.0, 0.0, 0.1)], **SMALL)
     cloud = _cloud(flat)

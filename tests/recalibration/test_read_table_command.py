@@ -119,6 +119,7 @@ def test_a_lying_tank(tmp_path, capsys):
     assert tankcal.load(out).tank.kind == "horizontal"
 
 
+@pytest.mark.slow
 def test_a_tilt_that_is_not_found_is_said_to_be_none(tmp_path, capsys):
     """By slices, level: the fit ends at a tilt of 7e-10 whose u is infinite."""
     dips = np.arange(0, 201, 2) / 100
@@ -130,6 +131,7 @@ def test_a_tilt_that_is_not_found_is_said_to_be_none(tmp_path, capsys):
     assert "lowers chi2" not in said
 
 
+@pytest.mark.slow
 def test_a_leaning_tank_that_is_dipped_near_its_low_end(tmp_path):
     """By slices: 8 mm/m over 9 m; the lowest liquid lies below the bottom at half the length."""
     dips = np.arange(0, 261, 2) / 100
