@@ -42,14 +42,14 @@ class ComparisonPaper(SavedPaper):
         super().__init__(words_with_part(load_words(language or DEFAULT), "comparison"))
         found = COMPARISON.migrated(found, COMPARISON.file)
         self.saved = found
-        texts = self._texts(found["rule"])
+        texts = self._texts_of_rule(found["rule"])
         own = {key: value for key, value in texts.items() if key != "clauses"}
         self.found = found | {"rule": found["rule"] and found["rule"] | own}
         for key in ("legal", "ages"):
             self.found[key] = [_with_clause(one, texts.get("clauses", {})) for one in found[key]]
         self.letterhead = letterhead.data() if letterhead else None
 
-    def _texts(self, rule):
+    def _texts_of_rule(self, rule):
         """The texts of a shipped rule; none of a laboratory's own file, whose own stay."""
         name = (rule or {}).get("file", "").removesuffix(".toml")
         texts = self.words.get("rule_texts", {}).get(name)
