@@ -3,16 +3,15 @@
 Nothing here computes a number: all of it is made from comparison.json.
 """
 
-import json
 from pathlib import Path
 
-from tankcal.errors import InputError, Problem, TankcalError, VocabularyError
 from tankcal.messages import message
 from tankcal.record import save
 from tankcal.record.comparison import COMPARISON, plain_of_comparison
 from tankcal.report import folders
 from tankcal.report.comparison.paper import FILE, WORKBOOK, ComparisonPaper
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL
+from tankcal.report.saved_folder import SavedFolder
 
 __all__ = [
     *("FILES", "ComparisonPaper", "comparison_file", "rebuild", "refuse_foreign"),
@@ -27,6 +26,17 @@ TABLES = {
     "courses.csv": COURSES,
 }
 FILES = (FILE, *TABLES, WORKBOOK, PDF, PAGE)
+_FOLDER = SavedFolder(
+    COMPARISON,
+    FILES,
+    unreadable=lambda error: message(
+        "comparison_unreadable", "cannot be read as a comparison: {error}", error=error
+    ),
+    without_content=lambda what: message(
+        "no_comparison", "does not have the content of a comparison ({what})", what=what
+    ),
+)
+refuse_foreign, comparison_file, load = _FOLDER.refuse_foreign, _FOLDER.file_of, _FOLDER.load
 
 
 def write_comparison(found, folder, language=None, progress=None, letterhead=None):
@@ -66,46 +76,9 @@ def write_comparison(found, folder, language=None, progress=None, letterhead=Non
 
 def rebuild(source, folder, language=None, progress=None, letterhead=None):
     """Write the same from a comparison.json alone; arguments as of `write_comparison`."""
-    found = load(source)
-    try:
-        return write_comparison(found, folder, language, progress, letterhead)
-    except VocabularyError as error:
-        what = str(error)
-    except TankcalError:
-        raise
-    except (LookupError, TypeError, ValueError, AttributeError) as error:
-        what = f"{type(error).__name__}: {error}"
-    expected = message(
-        "no_comparison", "does not have the content of a comparison ({what})", what=what
+    return _FOLDER.rebuild(
+        source, lambda found: write_comparison(found, folder, language, progress, letterhead)
     )
-    raise InputError(Problem(Path(source).name, expected))
-
-
-def comparison_file(path):
-    """The comparison that a path names, the file or its folder; None where it names none."""
-    path = Path(path)
-    if path.is_dir():
-        path = path / FILE
-        return path if path.is_file() else None
-    return path if path.name == FILE else None
-
-
-def load(path):
-    """Read a comparison.json; raises InputError when it is none."""
-    name = Path(path).name
-    try:
-        found = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        expected = message(
-            "comparison_unreadable", "cannot be read as a comparison: {error}", error=str(error)
-        )
-        raise InputError(Problem(name, expected)) from error
-    return COMPARISON.migrated(found, name)
-
-
-def refuse_foreign(folder):
-    """Raise InputError when `folder` exists and holds anything but results of a comparison."""
-    folders.refuse_foreign(folder, FILES)
 
 
 def _write(paper, folder, progress):

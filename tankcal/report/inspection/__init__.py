@@ -4,15 +4,14 @@ Nothing here computes a number: all of it is made from inspection.json. No part 
 capacity certificate.
 """
 
-import json
 from pathlib import Path
 
-from tankcal.errors import InputError, Problem, TankcalError, VocabularyError
 from tankcal.messages import message
 from tankcal.record import save
 from tankcal.record.inspection import INSPECTION, plain_of_inspection
 from tankcal.report import folders
 from tankcal.report.inspection.paper import FILE, WORKBOOK, InspectionPaper
+from tankcal.report.saved_folder import SavedFolder
 
 __all__ = [
     *("FILES", "InspectionPaper", "inspection_file", "rebuild", "refuse_foreign"),
@@ -21,6 +20,17 @@ __all__ = [
 
 PDF = "inspection.pdf"
 FILES = (FILE, WORKBOOK, PDF)
+_FOLDER = SavedFolder(
+    INSPECTION,
+    FILES,
+    unreadable=lambda error: message(
+        "inspection_unreadable", "cannot be read as an inspection: {error}", error=error
+    ),
+    without_content=lambda what: message(
+        "no_inspection", "does not have the content of an inspection ({what})", what=what
+    ),
+)
+refuse_foreign, inspection_file, load = _FOLDER.refuse_foreign, _FOLDER.file_of, _FOLDER.load
 
 
 def write_inspection(found, out, language=None, progress=None, letterhead=None):
@@ -60,46 +70,9 @@ def write_inspection(found, out, language=None, progress=None, letterhead=None):
 
 def rebuild(source, out, language=None, progress=None, letterhead=None):
     """Write the same from an inspection.json alone; arguments as of `write_inspection`."""
-    found = load(source)
-    try:
-        return write_inspection(found, out, language, progress, letterhead)
-    except VocabularyError as error:
-        what = str(error)
-    except TankcalError:
-        raise
-    except (LookupError, TypeError, ValueError, AttributeError) as error:
-        what = f"{type(error).__name__}: {error}"
-    expected = message(
-        "no_inspection", "does not have the content of an inspection ({what})", what=what
+    return _FOLDER.rebuild(
+        source, lambda found: write_inspection(found, out, language, progress, letterhead)
     )
-    raise InputError(Problem(Path(source).name, expected))
-
-
-def inspection_file(path):
-    """The inspection that a path names, the file or its folder; None where it names none."""
-    path = Path(path)
-    if path.is_dir():
-        path = path / FILE
-        return path if path.is_file() else None
-    return path if path.name == FILE else None
-
-
-def load(path):
-    """Read an inspection.json; raises InputError when it is none."""
-    name = Path(path).name
-    try:
-        found = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        expected = message(
-            "inspection_unreadable", "cannot be read as an inspection: {error}", error=str(error)
-        )
-        raise InputError(Problem(name, expected)) from error
-    return INSPECTION.migrated(found, name)
-
-
-def refuse_foreign(out):
-    """Raise InputError when `out` exists and holds anything but results of an inspection."""
-    folders.refuse_foreign(out, FILES)
 
 
 def _write(paper, folder, progress):

@@ -1,0 +1,67 @@
+"""The folder of a saved file that is no record, such as inspection.json, and its papers."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from tankcal.errors import InputError, Problem, TankcalError, VocabularyError
+from tankcal.messages import Message
+from tankcal.record.saved_formats import SavedFormat
+from tankcal.report import folders
+
+
+@dataclass(frozen=True)
+class SavedFolder:
+    """What a command leaves behind: a saved file, and what is made from it alone.
+
+    Attributes
+    ----------
+    saved_format : SavedFormat
+        Of the file.
+    files : tuple of str
+        Everything that may lie there, the file first.
+    unreadable : callable
+        unreadable(error) -> Message of a file that is no JSON.
+    without_content : callable
+        without_content(what) -> Message of a file that does not hold what it should.
+    """
+
+    saved_format: SavedFormat
+    files: tuple[str, ...]
+    unreadable: Callable[[str], Message]
+    without_content: Callable[[str], Message]
+
+    def refuse_foreign(self, folder):
+        """Raise InputError when a folder exists and holds anything else."""
+        folders.refuse_foreign(folder, self.files)
+
+    def file_of(self, path):
+        """The saved file that a path names, itself or its folder; None where it names none."""
+        path, name = Path(path), self.saved_format.file
+        if path.is_dir():
+            path = path / name
+            return path if path.is_file() else None
+        return path if path.name == name else None
+
+    def load(self, path):
+        """Read the saved file; raises InputError when it is none."""
+        name = Path(path).name
+        try:
+            found = json.loads(Path(path).read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError) as error:
+            raise InputError(Problem(name, self.unreadable(str(error)))) from error
+        return self.saved_format.migrated(found, name)
+
+    def rebuild(self, source, write):
+        """What write(found) gives of a saved file; InputError where its content is another."""
+        found = self.load(source)
+        try:
+            return write(found)
+        except VocabularyError as error:
+            what = str(error)
+        except TankcalError:
+            raise
+        except (LookupError, TypeError, ValueError, AttributeError) as error:
+            what = f"{type(error).__name__}: {error}"
+        raise InputError(Problem(Path(source).name, self.without_content(what)))
