@@ -5,18 +5,16 @@ limits of one kind of check. A rule may lack any of them: a check without limit 
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from tankcal.inspection.settlement_limits import BULGE, EDGE, SETTLEMENT, SOURCE
 from tankcal.job.contract.shorthand import positive
 from tankcal.job.entries import read_section
 from tankcal.job.fields import Field
-from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
-from tankcal.job.rule_files import tell_unknown_rule
-from tankcal.job.tables import Log, nearest, read_bytes
+from tankcal.job.folder import read_toml
+from tankcal.job.rule_files import ShippedRules
+from tankcal.job.tables import nearest
 from tankcal.messages import message
 from tankcal.record.inspection import InspectionLimit
-from tankcal.text.shipped import shipped_folder
 
 DEFAULT = "api_653"
 HEAD = (
@@ -43,7 +41,6 @@ SECTIONS = {
     "edge": EDGE,
     "bulge": BULGE,
 }  # fmt: skip
-_FOLDER, _ENDING = "inspection/rules", ".toml"
 
 
 @dataclass(frozen=True)
@@ -69,36 +66,6 @@ class Rule:
     def verified(self):
         """Whether every value was read in the text itself."""
         return all(one["verified"] for one in self.sections.values())
-
-
-def shipped_names():
-    """Names of the rules that ship with tankcal."""
-    return tuple(sorted(path.stem for path in shipped_folder(_FOLDER).glob(f"*{_ENDING}")))
-
-
-def shipped_rule(name):
-    """A Rule that ships with tankcal. Raises ValueError for a name that does not."""
-    if name not in shipped_names():
-        raise ValueError(f"no rule {name!r}; expected one of {', '.join(shipped_names())}")
-    path, log = shipped_folder(_FOLDER) / f"{name}{_ENDING}", Log()
-    rule = parse_rule(path.name, path.read_bytes(), log)
-    log.stop_if_problems()
-    return rule
-
-
-def find_rule(name, log):
-    """The Rule of a shipped rule's name or the path of a file; None after telling `log`.
-
-    name  such as "api_653" or "rules/house.toml"
-    """
-    if name in shipped_names():
-        return shipped_rule(name)
-    path = Path(name)
-    if name.lower().endswith(_ENDING) and path.is_file():
-        data = read_bytes(path, log, MAX_SETTINGS_BYTES)
-        return None if data is None else parse_rule(path.name, data, log)
-    tell_unknown_rule(name, shipped_names(), log)
-    return None
 
 
 def parse_rule(file, data, log):
@@ -135,6 +102,19 @@ def parse_rule(file, data, log):
             values["verified"] = bool(head["verified"])
         values["clause"] = values["clause"] or ""
     return Rule(head["name"], head["source"], head["remark"] or "", file, sections)
+
+
+_SHIPPED = ShippedRules("inspection/rules", parse_rule)
+shipped_names, shipped_rule = _SHIPPED.names, _SHIPPED.rule
+
+
+def find_rule(name, log):
+    """The Rule of a shipped rule's name or the path of a file; None after telling `log`.
+
+    name  such as "api_653" or "rules/house.toml"
+    """
+    found = _SHIPPED.named(name, log)
+    return None if found is None else found[0]
 
 
 def limit_of(rule, code, *, diameter_m=None, height_m=None):

@@ -5,6 +5,8 @@ limit of the expanded uncertainty, each [deviation.NAME] one of the deviation fr
 [reference_height.NAME] and [period.NAME] are of a new table beside a former one.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from tankcal.job.contract.shorthand import choice, positive
@@ -72,22 +74,45 @@ LIMITS = {
 }
 
 
-_FOLDER, _ENDING = "job/rule_tables", ".toml"
+_ENDING = ".toml"
 
 
-def shipped_names():
-    """Names of the rules that ship with tankcal, for `shipped_rule`."""
-    return tuple(sorted(path.stem for path in shipped_folder(_FOLDER).glob(f"*{_ENDING}")))
+@dataclass(frozen=True)
+class ShippedRules:
+    """The rules of one kind: those that ship with tankcal, and files of a laboratory's own.
 
+    folder  of the shipped ones, below the package
+    parse   parse(file, data, log) -> a rule, or None after telling `log`
+    """
 
-def shipped_rule(name):
-    """A Rule that ships with tankcal. Raises ValueError for a name that does not."""
-    if name not in shipped_names():
-        raise ValueError(f"no rule {name!r}; expected one of {', '.join(shipped_names())}")
-    path, log = shipped_folder(_FOLDER) / f"{name}{_ENDING}", Log()
-    rule = parse_rule(path.name, path.read_bytes(), log)
-    log.stop_if_problems()
-    return rule
+    folder: str
+    parse: Callable
+
+    def names(self):
+        """Names of the rules that ship with tankcal."""
+        return tuple(sorted(path.stem for path in shipped_folder(self.folder).glob(f"*{_ENDING}")))
+
+    def rule(self, name):
+        """A rule that ships with tankcal. Raises ValueError for a name that does not."""
+        if name not in self.names():
+            raise ValueError(f"no rule {name!r}; expected one of {', '.join(self.names())}")
+        path, log = shipped_folder(self.folder) / f"{name}{_ENDING}", Log()
+        rule = self.parse(path.name, path.read_bytes(), log)
+        log.stop_if_problems()
+        return rule
+
+    def named(self, name, log):
+        """(rule, file name) of --rule: a shipped name or a path; None after telling `log`."""
+        if name in self.names():
+            return self.rule(name), f"{name}{_ENDING}"
+        path = Path(name)
+        if name.lower().endswith(_ENDING) and path.is_file():
+            data = read_bytes(path, log, MAX_SETTINGS_BYTES)
+            rule = None if data is None else self.parse(path.name, data, log)
+            return None if rule is None else (rule, path.name)
+        missing = message("no_rule_file_there", "no such file: {file}", file=name)
+        _tell_unknown("--rule", None, None, name, missing, self.names(), log)
+        return None
 
 
 def limits_one_table(rule):
@@ -98,28 +123,6 @@ def limits_one_table(rule):
 def rules_of_one_table():
     """Names of the rules that ship with tankcal and that a job may name."""
     return tuple(name for name in shipped_names() if limits_one_table(shipped_rule(name)))
-
-
-def named_rule(name, log):
-    """(Rule, file name) of a shipped rule's name or the path of a file; None after telling `log`.
-
-    name  such as "france_2020_recalibration" or "rules/house.toml"
-    """
-    if name in shipped_names():
-        return shipped_rule(name), f"{name}{_ENDING}"
-    path = Path(name)
-    if name.lower().endswith(_ENDING) and path.is_file():
-        data = read_bytes(path, log, MAX_SETTINGS_BYTES)
-        rule = None if data is None else parse_rule(path.name, data, log)
-        return None if rule is None else (rule, path.name)
-    tell_unknown_rule(name, shipped_names(), log)
-    return None
-
-
-def tell_unknown_rule(name, rules, log):
-    """Tell `log` that --rule names neither a file nor one of these rules."""
-    missing = message("no_rule_file_there", "no such file: {file}", file=name)
-    _tell_unknown("--rule", None, None, name, missing, rules, log)
 
 
 def find_rule(raw, name, log):
@@ -327,3 +330,7 @@ def _shared(name, values, rule_verified):
 
 def _part(percent):
     return None if percent is None else percent / 100
+
+
+_SHIPPED = ShippedRules("job/rule_tables", parse_rule)
+shipped_names, shipped_rule, named_rule = _SHIPPED.names, _SHIPPED.rule, _SHIPPED.named
