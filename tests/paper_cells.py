@@ -7,12 +7,12 @@ texts(found)                                      every text in them
 table_of(found, "Capacity at each height")        rows of the table whose caption begins so
 """
 
-import ast
+from pathlib import Path
 
 from tankcal import record as records
 from tankcal.report import missing
-from tankcal.report.blocks import Block
-from tankcal.report.notebook import TEMPLATES, joined
+from tankcal.report.blocks import MIME
+from tankcal.report.notebook import TEMPLATES, execute, joined
 
 
 def paper_blocks(record_path, templates=TEMPLATES[:2]):
@@ -30,21 +30,11 @@ def of_part(found, part):
     return shown
 
 
-def blocks_of_cells(notebook):
+def blocks_of_cells(notebook, folder="."):
     """The data of every block that the cells of a notebook show, in order."""
-    shown = []
-    names = {"display": lambda *found: shown.extend(found)}
-    for cell in notebook.cells:
-        shown.append(_value_of(cell.source, names))
-    return [one.data for one in shown if isinstance(one, Block)]
-
-
-def _value_of(source, names):
-    """Execute a cell; the value of its last line when that is an expression."""
-    tree = ast.parse(source)
-    last = tree.body[-1] if isinstance(tree.body[-1], ast.Expr) else None
-    exec(compile(ast.Module(tree.body[: -1 if last else None], []), "cell", "exec"), names)
-    return eval(compile(ast.Expression(last.value), "cell", "eval"), names) if last else None
+    cells = execute(notebook, Path(folder))["cells"]
+    shown = [output["data"] for cell in cells for output in cell["outputs"] if "data" in output]
+    return [data[MIME] for data in shown if MIME in data]
 
 
 def texts(found):

@@ -112,23 +112,28 @@ def set_papers(notebook, directory, parts, progress=None):
     progress : optional
         Called as progress(done, total) while it works.
     """
-    import nbformat
+    from concurrent.futures import ThreadPoolExecutor
 
     from tankcal.report.document import blocks_of
-    from tankcal.report.notebook import execute
+    from tankcal.report.notebook import execute, written
     from tankcal.report.pdf import pdf
     from tankcal.report.web import page
 
-    total = len(notebook.cells) + len(parts) + 2
+    cells = len(notebook["cells"])
+    total = cells + len(parts) + 2
     progress = progress or (lambda done, total: None)
     execute(notebook, directory, on_cell=lambda done: progress(done, total))
 
-    contents = {"report.ipynb": nbformat.writes(notebook).encode("utf-8")}
-    for name, part in parts:
-        contents[name] = pdf(blocks_of(notebook, part), directory)
-        progress(len(notebook.cells) + len(contents), total)
-    contents["report.html"] = page(blocks_of(notebook)).encode("utf-8")
+    with ThreadPoolExecutor() as pool:  # the typesetter works outside Python
+        pages = {
+            name: pool.submit(pdf, blocks_of(notebook, part), directory) for name, part in parts
+        }
+        contents = {"report.ipynb": written(notebook).encode("utf-8")}
+        contents["report.html"] = page(blocks_of(notebook)).encode("utf-8")
+        for name, one in pages.items():
+            contents[name] = one.result()
+            progress(cells + len(contents), total)
     for name, content in contents.items():
         (directory / name).write_bytes(content)
     progress(total, total)
-    return [directory / name for name in contents]
+    return [directory / name for name in ("report.ipynb", *dict(parts), "report.html")]

@@ -54,29 +54,31 @@ def _headings_in_steps(found):
 def _cells(notebook, part):
     """(number, cell) of the cells that belong to `part`; a cell belongs with those before it."""
     current = ""
-    for number, cell in enumerate(notebook.cells, 1):
-        tags = cell.metadata.get("tags", [])
+    for number, cell in enumerate(notebook["cells"], 1):
+        tags = cell["metadata"].get("tags", [])
         current = next((tag for tag in tags if tag in PARTS), current)
         if current in ("", part) or (not part and current not in BESIDE):
             yield number, cell
 
 
 def _blocks_of_cell(cell, place):
-    if cell.cell_type == "markdown":
-        return [{"kind": "markdown", "nodes": nodes(cell.source)}] if cell.source.strip() else []
-    if cell.cell_type != "code":
+    if cell["cell_type"] == "markdown":
+        return (
+            [{"kind": "markdown", "nodes": nodes(cell["source"])}] if cell["source"].strip() else []
+        )
+    if cell["cell_type"] != "code":
         return []
-    shown = [_block_of_output(output, place) for output in cell.outputs]
+    shown = [_block_of_output(output, place) for output in cell["outputs"]]
     return [block for block in shown if block]
 
 
 def _block_of_output(output, place):
-    if output.output_type == "error":
-        raise TankcalError(f"{place} of the notebook failed: {output.ename}: {output.evalue}")
-    if output.output_type == "stream":
-        if output.name == "stderr":  # remarks of libraries; they stay in the notebook
+    if output["output_type"] == "error":
+        raise TankcalError(f"{place} of the notebook failed: {output['ename']}: {output['evalue']}")
+    if output["output_type"] == "stream":
+        if output["name"] == "stderr":  # remarks of libraries; they stay in the notebook
             return None
-        return blocks.code(output.text.rstrip("\n")).data if output.text.strip() else None
+        return blocks.code(output["text"].rstrip("\n")).data if output["text"].strip() else None
     data = output.get("data", {})
     if blocks.MIME in data:
         return _checked(data[blocks.MIME], place)

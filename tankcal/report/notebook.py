@@ -1,20 +1,22 @@
-"""The report's notebook: the templates joined, and executed by this very Python."""
+"""The report's notebook: the templates joined, and executed within this process.
+
+A notebook is plain data here, {"cells": [...], "metadata": {...}, ...} as its file has it; one that
+`nbformat` read is such data, too.
+"""
 
 import ast
+import io
+import json
 import logging
-import os
 import sys
-import tempfile
-from pathlib import Path
-
-import nbformat
+from contextlib import redirect_stderr, redirect_stdout
 
 from tankcal.errors import TankcalError, VocabularyError
 from tankcal.text.shipped import shipped_folder
 
 TEMPLATES = ("certificate.ipynb", "working_papers.ipynb", "field_table.ipynb")
-CELL_TIMEOUT_S = 600
-LONGEST_SOCKET = 90  # characters of a socket's path; systems end at 104 to 108
+FILES_IN_PARAMETERS = ("RECORD", "LETTERHEAD")  # they lie in the folder of the notebook
+_TEXTS = ("source", "text")
 
 
 def joined(record_name, lacks=(), templates=TEMPLATES, **parameters):
@@ -28,15 +30,23 @@ def joined(record_name, lacks=(), templates=TEMPLATES, **parameters):
     Raises TankcalError for a parameter that the templates do not have.
     """
     folder = shipped_folder("report_templates")
-    whole, *others = (nbformat.read(folder / name, as_version=4) for name in templates)
+    whole, *others = (_read(folder / name) for name in templates)
+    cells = whole["cells"]
     for other in others:
-        whole.cells += [c for c in other.cells if not _tags(c) & {"parameters", "setup"}]
+        cells += [c for c in other["cells"] if not _tags(c) & {"parameters", "setup"}]
     unneeded = {f"if:{part}" for part in lacks}
-    whole.cells = [cell for cell in whole.cells if not _tags(cell) & unneeded]
+    whole["cells"] = [cell for cell in cells if not _tags(cell) & unneeded]
     set_parameters(whole, {"RECORD": record_name, **parameters})
-    for number, cell in enumerate(whole.cells, 1):
-        cell.id = f"cell-{number}"
+    for number, cell in enumerate(whole["cells"], 1):
+        cell["id"] = f"cell-{number}"
     return whole
+
+
+def _read(path):
+    notebook = json.loads(path.read_text(encoding="utf-8"))
+    for cell in notebook["cells"]:
+        cell["source"] = "".join(cell["source"])
+    return notebook
 
 
 def set_parameters(notebook, values):
@@ -44,113 +54,151 @@ def set_parameters(notebook, values):
 
     Raises TankcalError when there is not one such cell, or when it has no such name.
     """
-    cells = [cell for cell in notebook.cells if "parameters" in _tags(cell)]
+    cells = [cell for cell in notebook["cells"] if "parameters" in _tags(cell)]
     if len(cells) != 1:
         raise TankcalError(f"the notebook has {len(cells)} parameters cells, not one")
     known = {
         statement.targets[0].id: ast.literal_eval(statement.value)
-        for statement in ast.parse(cells[0].source).body
+        for statement in ast.parse(cells[0]["source"]).body
     }
     unknown = sorted(set(values) - set(known))
     if unknown:
         raise TankcalError(
             f"the notebook has no parameter {', '.join(unknown)}; it has: {', '.join(known)}"
         )
-    cells[0].source = "\n".join(f"{name} = {value!r}" for name, value in (known | values).items())
+    lines = (f"{name} = {value!r}" for name, value in (known | values).items())
+    cells[0]["source"] = "\n".join(lines)
 
 
 def _tags(cell):
-    return set(cell.metadata.get("tags", []))
+    return set(cell["metadata"].get("tags", []))
 
 
 def execute(notebook, folder, on_cell=None):
-    """Execute `notebook` in place, with `folder` as its working directory.
+    """Execute a notebook of `joined` in place, as Jupyter would; `folder` is where it will lie.
 
     on_cell   called with the number of cells done, after each
 
-    The kernel is this interpreter itself, whatever kernels are installed; it needs neither network
-    nor a home folder that can be written to. Raises TankcalError naming the cell that failed.
+    The templates are our own code: they run in this process, without a kernel, which takes as long
+    to start as all of their cells to run. A notebook that somebody changed is a matter for Jupyter
+    or nbconvert. Raises TankcalError naming the cell that failed.
     """
-    from nbclient import NotebookClient
-    from nbclient.exceptions import CellExecutionError, CellTimeoutError
-
-    def done(cell, cell_index, execute_reply):
+    _load_matplotlib()
+    shown = []
+    names = {"__name__": "__main__", "display": lambda *values: shown.extend(map(_display, values))}
+    count = 0
+    for number, cell in enumerate(notebook["cells"], 1):
+        if cell["cell_type"] == "code":
+            count += 1
+            shown.clear()
+            printed = {"stdout": io.StringIO(), "stderr": io.StringIO()}
+            try:
+                with redirect_stdout(printed["stdout"]), redirect_stderr(printed["stderr"]):
+                    value = _run_cell(cell["source"], names)
+            except VocabularyError:
+                raise
+            except Exception as error:
+                first_line = (cell["source"].strip().splitlines() or [""])[0]
+                raise TankcalError(
+                    f"the report stopped in cell {number} ({first_line}): "
+                    f"{type(error).__name__}: {error}"
+                ) from error
+            if "parameters" in _tags(cell):
+                names |= _files_beside(names, folder)
+            outputs = [_stream(name, text.getvalue()) for name, text in printed.items()]
+            outputs += [*shown, _result(value, count)]
+            cell["outputs"] = [output for output in outputs if output]
+            cell["execution_count"] = count
         if on_cell:
-            on_cell(cell_index + 1)
-
-    with tempfile.TemporaryDirectory(prefix="tankcal-", ignore_cleanup_errors=True) as scratch:
-        client = NotebookClient(
-            notebook,
-            km=_kernel_manager(scratch),
-            timeout=CELL_TIMEOUT_S,
-            record_timing=False,
-            shutdown_kernel="immediate",
-            on_cell_executed=done,
-            resources={"metadata": {"path": str(folder)}},
-        )
-        try:
-            client.execute(env=_environment(scratch), cleanup_kc=True)
-        except CellExecutionError as error:
-            if error.ename == VocabularyError.__name__:
-                raise VocabularyError(error.evalue) from error
-            raise TankcalError(
-                f"the report stopped in {_failed_cell(notebook)}: {error.ename}: {error.evalue}"
-            ) from error
-        except (CellTimeoutError, RuntimeError) as error:  # a kernel that died or never started
-            raise TankcalError(f"the report stopped: {error}") from error
+            on_cell(number)
+    notebook["metadata"]["language_info"] = _language_info()
     return notebook
 
 
-def _kernel_manager(scratch):
-    from jupyter_client.kernelspec import KernelSpec
-    from jupyter_client.manager import AsyncKernelManager
-
-    class ThisInterpreter(AsyncKernelManager):
-        """Starts ipykernel in the Python that runs now; no kernel needs to be registered."""
-
-        @property
-        def kernel_spec(self):
-            command = [sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"]
-            quiet = ["--HistoryManager.enabled=False"]
-            return KernelSpec(argv=command + quiet, display_name="Python 3", language="python")
-
-    manager = ThisInterpreter(connection_file=str(Path(scratch) / "kernel.json"))
-    socket = str(Path(scratch) / "kernel")
-    if os.name == "posix" and len(socket) < LONGEST_SOCKET:
-        manager.transport = "ipc"  # no port that another report might take at the same moment
-        manager.ip = socket
-    return manager
+def _run_cell(source, names):
+    """Run the statements of a cell; the value of its last line where that is an expression."""
+    tree = ast.parse(source)
+    last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+    exec(compile(tree, "<cell>", "exec"), names)
+    return last and eval(compile(ast.Expression(last.value), "<cell>", "eval"), names)
 
 
-def _environment(scratch):
-    """The kernel's environment: whatever it wants to write goes to the scratch folder."""
-    environment = {
-        **os.environ,
-        "IPYTHONDIR": str(Path(scratch) / "ipython"),
-        "JUPYTER_RUNTIME_DIR": str(scratch),
-        "MPLCONFIGDIR": _matplotlib_folder(),
-        "PYDEVD_DISABLE_FILE_VALIDATION": "1",
+def _files_beside(names, folder):
+    """The parameters that name files, with their paths: this process has a folder of its own."""
+    found = {name: names.get(name) for name in FILES_IN_PARAMETERS}
+    return {name: str(folder / value) for name, value in found.items() if value}
+
+
+def _display(value):
+    return {"output_type": "display_data", "data": _bundle(value), "metadata": {}}
+
+
+def _result(value, count):
+    if value is None:
+        return None
+    of = {"output_type": "execute_result", "execution_count": count}
+    return {**of, "data": _bundle(value), "metadata": {}}
+
+
+def _stream(name, text):
+    return {"output_type": "stream", "name": name, "text": text} if text else None
+
+
+def _bundle(value):
+    """What Jupyter would keep of a value: the forms of a block, the text of anything else."""
+    if hasattr(value, "_repr_mimebundle_"):
+        return value._repr_mimebundle_()
+    return {"text/plain": repr(value)}
+
+
+def _language_info():
+    """What a kernel of this Python says of its language."""
+    return {
+        "codemirror_mode": {"name": "ipython", "version": sys.version_info.major},
+        "file_extension": ".py",
+        "mimetype": "text/x-python",
+        "name": "python",
+        "nbconvert_exporter": "python",
+        "pygments_lexer": "ipython3",
+        "version": ".".join(map(str, sys.version_info[:3])),
     }
-    environment.pop("MPLBACKEND", None)
-    return environment
 
 
-def _matplotlib_folder():
-    """Where matplotlib keeps its font cache: it finds a folder that it can write to."""
+def written(notebook):
+    """The file of a notebook, as `nbformat.writes` makes it: long texts are lists of lines."""
+    cells = [_in_lines(cell) for cell in notebook["cells"]]
+    text = {"ensure_ascii": False, "indent": 1, "sort_keys": True, "separators": (",", ": ")}
+    return json.dumps({**notebook, "cells": cells}, **text)
+
+
+def _in_lines(cell):
+    made = {key: _lines(value) if key in _TEXTS else value for key, value in cell.items()}
+    if "outputs" in cell:
+        made["outputs"] = [_output_in_lines(output) for output in cell["outputs"]]
+    return made
+
+
+def _output_in_lines(output):
+    made = {key: _lines(value) if key in _TEXTS else value for key, value in output.items()}
+    if "data" in output:
+        of_text = {name: not name.endswith("json") for name in output["data"]}
+        made["data"] = {
+            name: _lines(value) if of_text[name] else value
+            for name, value in output["data"].items()
+        }
+    return made
+
+
+def _lines(text):
+    return text.splitlines(keepends=True) if isinstance(text, str) else text
+
+
+def _load_matplotlib():
+    """Load it without the remark that it made a temporary folder for its fonts."""
     logger = logging.getLogger("matplotlib")
     level = logger.level
-    logger.setLevel(logging.ERROR)  # that it took a temporary one is nobody's concern
+    logger.setLevel(logging.ERROR)
     try:
-        import matplotlib
-
-        return matplotlib.get_configdir()
+        import matplotlib  # noqa: F401
     finally:
         logger.setLevel(level)
-
-
-def _failed_cell(notebook):
-    for number, cell in enumerate(notebook.cells, 1):
-        if any(output.output_type == "error" for output in cell.get("outputs", [])):
-            first_line = (cell.source.strip().splitlines() or [""])[0]
-            return f"cell {number} ({first_line})"
-    return "a cell"

@@ -224,7 +224,7 @@ def test_a_link_is_followed(done, tmp_path, capsys):
 
 @pytest.mark.slow
 def test_an_interruption_in_disguise_is_no_traceback(done, monkeypatch, capsys):
-    """nbclient turns Ctrl-C at the start of a kernel into an AssertionError."""
+    """A library may turn Ctrl-C into an error of its own."""
     from tankcal import report
 
     def interrupted(*arguments):

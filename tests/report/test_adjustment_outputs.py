@@ -537,7 +537,7 @@ def test_the_papers_of_a_tank_begin_with_the_adjustment(whole):
 
 def test_the_chapter_vanishes_without_an_adjustment():
     lacks = [part for part in ("adjustment", "corrections")]
-    sources = "".join(cell.source for cell in joined("record.json", lacks).cells)
+    sources = "".join(cell["source"] for cell in joined("record.json", lacks)["cells"])
     assert "adjusted_groups" not in sources
     assert "capacity_curves" in sources
 
