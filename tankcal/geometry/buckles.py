@@ -6,7 +6,7 @@ between its parts.
 """
 
 import numpy as np
-from scipy.spatial import Delaunay
+import scipy
 
 from tankcal.geometry.patches import find_patches
 
@@ -56,4 +56,4 @@ def _is_buckle(patch_m, others_m):
     long, wide = np.ptp(patch_m @ axes.T, axis=0)
     if wide < NARROWEST_M or long < SHORTEST_M:
         return False
-    return not np.any(Delaunay(patch_m).find_simplex(others_m) >= 0)
+    return not np.any(scipy.spatial.Delaunay(patch_m).find_simplex(others_m) >= 0)

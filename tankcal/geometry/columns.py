@@ -9,7 +9,7 @@ worth is no better known.
 """
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from tankcal.geometry.patches import find_patches
 
@@ -100,7 +100,7 @@ def _denials(place_m, depth, column, accepted, noise_m):
     if not len(near):
         return 0
     scale = np.array([1.0, reach / LINK_M[1]])  # the nearest across counts, and the height little
-    nearest = cKDTree(place_m[column] * scale).query(place_m[near] * scale)[1]
+    nearest = scipy.spatial.cKDTree(place_m[column] * scale).query(place_m[near] * scale)[1]
     own = column[nearest]
     least = depth[own] - STEEPEST * np.abs(arc[near] - arc[own]) - SIGMA * noise_m
     return np.count_nonzero(depth[near] < least)

@@ -17,7 +17,6 @@ from functools import cache
 
 import numpy as np
 import scipy.linalg
-from scipy.spatial import ConvexHull
 
 from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, mode_shares
 from tankcal.geometry.outlines import FULL_TURN
@@ -273,6 +272,8 @@ def _outline(rng, variances_m2, radius_m):
 def _excess_of(radii_m):
     """P^2 / (4 pi A) - 1 of the hull's perimeter and the outline's area, radii at even azimuths."""
     turn = FULL_TURN * np.arange(len(radii_m)) / len(radii_m)
-    hull = ConvexHull(np.column_stack([radii_m * np.cos(turn), radii_m * np.sin(turn)]))
+    hull = scipy.spatial.ConvexHull(
+        np.column_stack([radii_m * np.cos(turn), radii_m * np.sin(turn)])
+    )
     chords = (turn[1] / np.sin(turn[1] / 2) / 2) ** 2  # of the polygon of a circle, to its arcs
     return chords * hull.area**2 / (2 * np.sum(radii_m**2) * turn[1] * np.pi) - 1

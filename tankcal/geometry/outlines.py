@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.interpolate
+import scipy
 
 from tankcal.errors import SolutionError
 from tankcal.geometry.form import (

@@ -1,9 +1,9 @@
 """Points of a wall that hang together: patches, of which buckles, seams and columns are told."""
 
 import numpy as np
+import scipy
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 
 def find_patches(place_m, members, link_m, fewest):
@@ -36,7 +36,7 @@ def find_patches(place_m, members, link_m, fewest):
     if len(members) < fewest:
         return []
     norm = np.inf if np.ndim(link_m) else 2.0
-    tree = cKDTree(place_m[members] / link_m)
+    tree = scipy.spatial.cKDTree(place_m[members] / link_m)
     pairs = tree.query_pairs(1.0, p=norm, output_type="ndarray")
     links = csr_array((np.ones(len(pairs)), pairs.T), shape=(len(members),) * 2)
     count, label = connected_components(links, directed=False)

@@ -14,7 +14,6 @@ Source: Ahn 2004, Least Squares Orthogonal Distance Fitting.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.optimize
 import scipy.sparse
 
 from tankcal.adjust import adjust

@@ -13,7 +13,7 @@ Systems 10, 5.
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from tankcal.errors import SolutionError
 
@@ -52,7 +52,9 @@ class Combination:
         if not 1e-9 < p < 1 - 1e-9:
             raise ValueError(f"probability {p}: expected between 1e-9 and 1 - 1e-9")
         ends = self.mean - self._reach, self.mean + self._reach
-        return brentq(lambda y: self.cdf(y) - p, *ends, xtol=1e-13 * self._reach, rtol=1e-14)
+        return scipy.optimize.brentq(
+            lambda y: self.cdf(y) - p, *ends, xtol=1e-13 * self._reach, rtol=1e-14
+        )
 
     def half_width(self, probability):
         """Half-width of the interval about the mean that holds that probability, the shortest."""

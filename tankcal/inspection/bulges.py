@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from scipy import sparse
-from scipy.optimize import linprog
-from scipy.stats import f
 
 from tankcal.adjust import ALPHA
 from tankcal.inspection.levelling import LEAST_READINGS
@@ -183,7 +182,9 @@ def beside_a_bulge(r, z, weights, squares, least_radius):
     left = np.where(allowed, np.maximum(one[2] + two[2], 1e-9 * squares), np.inf).min(axis=1)
     size, dof = j[:, 0] - i[:, 0], count - (j - i)[:, 0] - 4
     gained = np.maximum(squares - left, 0.0)
-    chance = np.where(np.isfinite(left), f.logsf(gained / size / (left / dof), size, dof), 0.0)
+    chance = np.where(
+        np.isfinite(left), scipy.stats.f.logsf(gained / size / (left / dof), size, dof), 0.0
+    )
     best = int(np.lexsort((size, chance))[0])
     if chance[best] > np.log(ALPHA / len(chance)):
         return None
@@ -212,7 +213,7 @@ def _line_of_least_deviations(r, z, flat):
     count, centre, level = int(flat.sum()), r[flat].mean(), z[flat].mean()
     columns = sparse.csr_array(np.column_stack([np.ones(count), r[flat] - centre]))
     eye = sparse.eye_array(count)
-    found = linprog(
+    found = scipy.optimize.linprog(
         np.concatenate([np.zeros(2), np.ones(2 * count)]),
         A_eq=sparse.hstack([columns, eye, -eye]),
         b_eq=z[flat] - level,

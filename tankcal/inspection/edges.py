@@ -11,7 +11,7 @@ What bulges inside of there is found by `bulges`.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, f
+import scipy
 
 from tankcal.adjust import ALPHA
 from tankcal.gum.coverage import coverage_factor
@@ -114,9 +114,9 @@ def find_break(r, z, sd, shell_radius_m):
         return None
     left = squares / dof
     if sd is not None and left <= 1:
-        factor, chance = 1.0, chi2.sf(gained, 2)
+        factor, chance = 1.0, scipy.stats.chi2.sf(gained, 2)
     else:
-        factor, chance = left, f.sf(gained / 2 / max(left, 1e-12 * gained), 2, dof)
+        factor, chance = left, scipy.stats.f.sf(gained / 2 / max(left, 1e-12 * gained), 2, dof)
     if chance > ALPHA:
         return None
     jacobian = bent_line(r, unknowns)[1] * weights[:, None]

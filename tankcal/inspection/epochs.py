@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import date
 
 import numpy as np
-from scipy.stats import chi2, f
+import scipy
 
 from tankcal.inspection.out_of_plane import arcs_after
 from tankcal.messages import list_some, message
@@ -166,5 +166,9 @@ def is_within_noise(epoch, dof):
     weights = epoch.u_m**-2.0
     off = epoch.z_m - np.average(epoch.z_m, weights=weights)
     weighed, free = float(off**2 @ weights), len(off) - 1
-    chance = chi2.sf(weighed, free) if np.isinf(dof) else f.sf(weighed / free, free, dof)
+    chance = (
+        scipy.stats.chi2.sf(weighed, free)
+        if np.isinf(dof)
+        else scipy.stats.f.sf(weighed / free, free, dof)
+    )
     return bool(chance > WITHIN_NOISE)

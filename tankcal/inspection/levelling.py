@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from tankcal.adjust import ALPHA
 from tankcal.errors import SolutionError
@@ -315,7 +315,7 @@ def _tell_disagreeing(values, groups, log):
     weighed = sum(
         np.sum(((z[rows] - _mean(values, rows, sd)) / sd[rows]) ** 2) for rows in groups.values()
     )
-    if chi2.sf(weighed, dof) < ALPHA:
+    if scipy.stats.chi2.sf(weighed, dof) < ALPHA:
         text = message("levels_repeats_off", "points that were levelled again differ {times:.1f}"
                        " times as much as s_mm says",
                        times=float(np.sqrt(weighed / dof)))  # fmt: skip

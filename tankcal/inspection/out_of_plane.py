@@ -13,7 +13,7 @@ spacing. Source: Marr, Ramos & Lambe 1982, Criteria for settlement of tanks, J. 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy
 
 from tankcal.geometry.form import harmonics
 
@@ -307,7 +307,7 @@ def largest_curvature_of(azimuth_rad, z_m, radius_m, highest):
     step = 2 * np.pi / (_STEPS * highest)
     grid = np.arange(_STEPS * highest) * step
     start = grid[np.argmax(size(grid))]
-    found = minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         lambda t: -size(t)[0],
         bounds=(start - step, start + step),
         method="bounded",

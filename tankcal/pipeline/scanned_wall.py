@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse
-from scipy.spatial import KDTree
 
 from tankcal.geometry.cylinders import FittedCylinder, cylinder_distances
 from tankcal.geometry.field.places import (
@@ -155,7 +154,7 @@ def _unlike_neighbours(job, fit, index, limit):
     """Indices of points that are far from the median of their neighbours."""
     xyz = job.points.xyz_m[index]
     distance = offsets(fit, xyz)
-    near = KDTree(xyz).query(xyz, NEIGHBOURS + 1)[1][:, 1:]
+    near = scipy.spatial.KDTree(xyz).query(xyz, NEIGHBOURS + 1)[1][:, 1:]
     away = np.abs(distance - np.median(distance[near], axis=1))
     return np.flatnonzero(away > max(limit * SCALE_OF_MEDIAN * np.median(away), DENT_M))
 

@@ -8,7 +8,7 @@ of q / sqrt(12), and rounded dips one of their own times the area of the surface
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
@@ -457,7 +457,7 @@ def _fit(rows, kind, ends, names, start, solid):
 
     low, high = _limits(names, start)
     scale = np.array([start[0] if name != "tilt" else 0.1 for name in names])
-    solved = least_squares(
+    solved = scipy.optimize.least_squares(
         residuals, np.clip(start, low, high), bounds=(low, high), x_scale=scale, xtol=1e-11,
         ftol=1e-11, gtol=1e-14, max_nfev=60,
     )  # fmt: skip

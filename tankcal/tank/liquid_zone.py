@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from tankcal.errors import HeightError, SolutionError
 from tankcal.messages import message
@@ -27,7 +27,7 @@ class MeasuredBottom(Part):
     levels_m: np.ndarray
     volumes_m3: np.ndarray
     errors_m3: np.ndarray
-    curve: PchipInterpolator
+    curve: "scipy.interpolate.PchipInterpolator"
     kind, moves_with_zero = "bottom", True
 
     @property
@@ -160,7 +160,9 @@ def measured_bottom(levels_m, volumes_m3, u_m3=None):
         common = min(1.0, u[row] / before) if before > 0 else 0.0
         errors[row] = common * errors[row - 1]
         errors[row, row] = np.sqrt(max(u[row] ** 2 - (common * before) ** 2, 0.0))
-    return MeasuredBottom(levels, volumes, errors, PchipInterpolator(levels, volumes))
+    return MeasuredBottom(
+        levels, volumes, errors, scipy.interpolate.PchipInterpolator(levels, volumes)
+    )
 
 
 @dataclass(frozen=True)

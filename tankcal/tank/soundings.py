@@ -11,8 +11,7 @@ Patterson & Thompson 1971.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.optimize
-from scipy.spatial.distance import cdist
+import scipy
 from scipy.special import ndtr
 
 from tankcal.errors import SolutionError
@@ -123,10 +122,14 @@ def _form(footprint, kriging, size, heights, edges):
     """
     found, predictor = _predicted(footprint, COVARIANCE_MESH, kriging, size, heights)
     grid, points = footprint.mesh(*COVARIANCE_MESH)[0] / size, kriging.points
-    wet, to_points, between = found.wet_weights(edges), cdist(grid, points), cdist(points, points)
+    wet, to_points, between = (
+        found.wet_weights(edges),
+        _distances(grid, points),
+        _distances(points, points),
+    )
     shown = wet @ predictor
     crossed = wet @ to_points @ shown.T
-    true = wet @ cdist(grid, grid) @ wet.T
+    true = wet @ _distances(grid, grid) @ wet.T
     both = crossed + crossed.T - true - shown @ between @ shown.T
     own = 2 * np.sum(predictor * to_points, axis=1)
     own -= np.sum(predictor @ between * predictor, axis=1)
@@ -182,7 +185,7 @@ class _Kriging:
         """(v, n) weights of the points' heights in the height at each vertex."""
         trend = _trend(self.points)
         system = np.block([[self.covariance, trend], [trend.T, np.zeros((TREND, TREND))]])
-        right = np.hstack([-self.form_m2 * cdist(grid, self.points), _trend(grid)])
+        right = np.hstack([-self.form_m2 * _distances(grid, self.points), _trend(grid)])
         return np.linalg.solve(system, right.T)[: len(trend)].T
 
     def left_out(self, heights):
@@ -204,7 +207,7 @@ def _kriging(points, heights, noise):
             )
         )
     contrasts = np.linalg.qr(trend, mode="complete")[0][:, TREND:]
-    form = -contrasts.T @ cdist(points, points) @ contrasts
+    form = -contrasts.T @ _distances(points, points) @ contrasts
     measured = contrasts.T @ (noise[:, None] * contrasts)
     seen = contrasts.T @ heights
 
@@ -234,8 +237,13 @@ def _kriging(points, heights, noise):
     ]
     amplitude, waves = np.exp(min(found, key=lambda one: one.fun).x)
     waves += LEAST_WAVES_M2
-    covariance = np.diag(noise + waves) - amplitude * cdist(points, points)
+    covariance = np.diag(noise + waves) - amplitude * _distances(points, points)
     return _Kriging(points, float(amplitude), float(waves), covariance, contrasts)
+
+
+def _distances(some, others):
+    """Between each of some points and each of others; rows are the first."""
+    return scipy.spatial.distance.cdist(some, others)
 
 
 def _trend(points):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 NODES = 49  # levels from empty to full
 MOST_BEND = 0.14  # of g: at the bottom (1 + cos t)^1.5 is 2.8, and a narrow groove no small change
@@ -95,11 +95,13 @@ class SurveyedForm:
 
     @cached_property
     def _bend(self):
-        return CubicSpline(node_turns(), self.bend, bc_type=((1, 0.0), "not-a-knot"))
+        return scipy.interpolate.CubicSpline(
+            node_turns(), self.bend, bc_type=((1, 0.0), "not-a-knot")
+        )
 
 
 def _through_nodes():
-    return CubicSpline(node_turns(), np.eye(NODES))
+    return scipy.interpolate.CubicSpline(node_turns(), np.eye(NODES))
 
 
 def _turn(level_share):

@@ -8,7 +8,7 @@ alike: half axes come out a little short, the centre does not move.
 """
 
 import numpy as np
-import scipy.optimize
+import scipy
 from scipy.special import ndtr
 
 from tankcal.calibration.targets.found import Circle, Found, Refused

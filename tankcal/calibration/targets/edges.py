@@ -17,7 +17,7 @@ Corners are intersections of two edges: nothing is measured next to a corner, wh
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.optimize
+import scipy
 from scipy.special import ndtr
 
 CURVED_FROM_PX = 40.0  # a shorter edge is taken as straight: a lens bends it by less than its noise

@@ -8,7 +8,7 @@ under it, at the height below that it has above; what stands out of the bottom i
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from tankcal.clouds.inside.floor_cells import (
     BIN_M,
@@ -239,7 +239,7 @@ def _scatter(values):
 
 def level_everywhere(z, is_bottom):
     """(across, across) height of the bottom in every cell; where it is not seen, of the nearest."""
-    nearest = ndimage.distance_transform_edt(~is_bottom, return_indices=True)[1]
+    nearest = scipy.ndimage.distance_transform_edt(~is_bottom, return_indices=True)[1]
     return np.where(is_bottom, z, np.nan)[tuple(nearest)]
 
 
@@ -279,7 +279,7 @@ def _what_lies_below(counts, level, grid):
     bins, number = grid.bins, np.arange(grid.bins)
     at = np.clip(np.floor((level - grid.low_m) / BIN_M), 0, bins - 1).astype(np.int64)[..., None]
     low = np.where(number < at - CLEAR_BINS, counts, 0)
-    above = ndimage.maximum_filter1d(counts, 2 * MIRROR_BINS + 1, axis=2)
+    above = scipy.ndimage.maximum_filter1d(counts, 2 * MIRROR_BINS + 1, axis=2)
     image = np.clip(2 * at - number, 0, bins - 1)
     mirrored = np.where(np.take_along_axis(above, image, axis=2) > 0, low, 0).sum(axis=2)
     total = low.sum(axis=2)
@@ -294,12 +294,12 @@ def _what_lies_below(counts, level, grid):
 
 
 def _pits(low, share, level, grid):
-    label, count = ndimage.label(np.isfinite(low), np.ones((3, 3)))
+    label, count = scipy.ndimage.label(np.isfinite(low), np.ones((3, 3)))
     found = []
     for one in range(1, count + 1):
         mine = label == one
         deep, top = float(np.median(low[mine])), float(np.median(level[mine]))
-        whole = ndimage.binary_fill_holes(ndimage.binary_closing(mine, np.ones((3, 3))))
+        whole = scipy.ndimage.binary_fill_holes(scipy.ndimage.binary_closing(mine, np.ones((3, 3))))
         area = float(np.nansum(np.where(np.isnan(share), 1.0, share)[whole])) * grid.cell_m**2
         if np.count_nonzero(mine) < LEAST_PIT_CELLS or top - deep < LEAST_PIT_M:
             continue

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse
-from scipy import ndimage
 
 from tankcal.clouds.inside.bottom import level_everywhere
 from tankcal.clouds.inside.floor_cells import STACK_M
@@ -177,14 +176,14 @@ def _labels(bottom, level):
     open_ &= (away < grid.surface.radius_m - WALL_M)[..., None]
     held = open_ & (bottom.cells.stack.reshape(shape) >= LEAST_POINTS)
     tall = held.sum(axis=2) > STANDING * open_.sum(axis=2).max(initial=1)
-    upright, standing = ndimage.label(tall, np.ones((3, 3)))
+    upright, standing = scipy.ndimage.label(tall, np.ones((3, 3)))
     label = np.zeros(shape, dtype=np.int64)
-    for one, where in enumerate(ndimage.find_objects(upright), start=1):
+    for one, where in enumerate(scipy.ndimage.find_objects(upright), start=1):
         if max(part.stop - part.start for part in where) > WIDEST_CELLS:
             continue
-        near = ndimage.binary_dilation(upright == one, np.ones((3, 3)))
+        near = scipy.ndimage.binary_dilation(upright == one, np.ones((3, 3)))
         label[near[..., None] & open_ & (label == 0)] = one
-    rest, count = ndimage.label(held & (label == 0), np.ones((3, 3, 3)))
+    rest, count = scipy.ndimage.label(held & (label == 0), np.ones((3, 3, 3)))
     sizes = np.bincount(rest.ravel(), minlength=count + 1)
     large = np.flatnonzero(sizes[1:] >= LEAST_CELLS) + 1
     number = np.zeros(count + 1, dtype=np.int64)

@@ -6,7 +6,7 @@ All of it is proposed: joints of the job stay true, and no volume is known of wh
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from tankcal.clouds.wall.cells import FAR_BINS, FAR_M
 from tankcal.clouds.wall.growing import EMPTY, WALL, spread_between
@@ -174,9 +174,9 @@ def find_obstructions(seen, grown, cells, column_m):
     masked, columns = ~seen, seen.shape[1]
     around = CLOSED_CELLS + 1
     closed = np.pad(masked, ((0, 0), (around, around)), mode="wrap")
-    closed = ndimage.binary_closing(closed, np.ones((3, 3)), CLOSED_CELLS - 1)
+    closed = scipy.ndimage.binary_closing(closed, np.ones((3, 3)), CLOSED_CELLS - 1)
     closed = closed[:, around:-around] | masked
-    label, count = ndimage.label(closed, np.ones((3, 3)))
+    label, count = scipy.ndimage.label(closed, np.ones((3, 3)))
     label = _joined_round(label, count)
     row, column = np.nonzero(masked)
     number = label[row, column]

@@ -8,7 +8,7 @@ begins with a step. Each cell's distance is then held against the trend of its n
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+import scipy
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -179,7 +179,7 @@ def _labels(occupied, runs, sound, joined_rows):
     block = np.cumsum(keep, axis=1)[:, :-1].reshape(occupied.shape) > 0
     structure = np.zeros((3, 3, 3), dtype=bool)
     structure[:, 1, :] = structure[1, :, :] = True
-    labels, count = ndimage.label(block, structure=structure)
+    labels, count = scipy.ndimage.label(block, structure=structure)
     pairs = [_touching(labels[:, -1], labels[:, 0], 1)]
     pairs += [_touching(labels[row - 1], labels[row], 4) for row in joined_rows if 0 < row < rows]
     labels = _united(labels, count, np.vstack(pairs))

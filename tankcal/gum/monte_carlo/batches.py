@@ -10,7 +10,7 @@ Sources: JCGM 101:2008 7.5 to 7.7, 7.9.4; control variates: Owen 2013 8.9.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+import scipy
 from scipy.special import ndtr, ndtri
 
 LEVELS = 501  # lower ends among which the shortest interval is sought
@@ -111,7 +111,7 @@ def _row(values, aid, probability):
     place = (np.arange(1, count + 1) - 1 / 3) / (count + 1 / 3)
     ends = np.interp(levels, place, ordered)
     middle = ends[:, (LEVELS - 1) // 2]
-    length = uniform_filter1d(ends[1] - ends[0], WINDOW, mode="nearest")
+    length = scipy.ndimage.uniform_filter1d(ends[1] - ends[0], WINDOW, mode="nearest")
     shortest = ends[:, np.argmin(length)]
     return (mean, deviation, *middle, *shortest), _plain(values, place, ordered, probability)
 

@@ -3,7 +3,7 @@
 import re
 
 import numpy as np
-import scipy.spatial
+import scipy
 from scipy.special import chdtri
 
 from tankcal.errors import Problem

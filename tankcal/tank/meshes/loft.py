@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from tankcal.geometry.field.estimate import LEVELS
 from tankcal.geometry.outlines import FULL_TURN
@@ -51,7 +51,7 @@ def shell_bands(volume, *, slices=8, azimuths=720):
         outlines = basis @ course.outlines_m
         even = np.linspace(0.0, FULL_TURN, outlines.shape[1] + 1)
         closed = np.column_stack([outlines, outlines[:, 0]])
-        radii = CubicSpline(even, closed, axis=1, bc_type="periodic")(azimuth)
+        radii = scipy.interpolate.CubicSpline(even, closed, axis=1, bc_type="periodic")(azimuth)
         heights = course.bottom_m + parts * course.height_m
         heights[-1] = course.top_m
         bands.append(Band(heights, radii, np.zeros((len(parts), 2))))
