@@ -127,8 +127,7 @@ def _ask_git(root, *words):
     try:
         done = subprocess.run(
             ["git", *ours, "-C", str(root), *words],
-            env=environment
-            | {"GIT_OPTIONAL_LOCKS": "0", "GIT_CEILING_DIRECTORIES": str(root.parent)},
+            env=environment | ours_alone,
             stdin=subprocess.DEVNULL,
             capture_output=True,
             timeout=_GIT_S,
