@@ -13,6 +13,7 @@ from tankcal.cli import (
     importing,
     inspecting,
     linting,
+    pages,
     planning,
     reporting,
     running,
@@ -137,6 +138,7 @@ def _parser_in_english():
     rooms = (running, reporting, starting, importing, planning, *tables, camera)
     for room in rooms:
         room.add(commands)
+    pages.add(commands)
     completing.add(commands, _parser_in_english)
     return parser, _translate
 

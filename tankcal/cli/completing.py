@@ -57,8 +57,9 @@ def script_for(shell, make_parser):
 
 
 def names_that_ship():
-    """{(command, option): (names, whether a TOML file may stand there, too)}."""
+    """{(command, option or argument): (names, whether a TOML file may stand there, too)}."""
     from tankcal.camera.formats.writing import KINDS
+    from tankcal.cli.pages import page_names
     from tankcal.exports.profiles import shipped_profiles
     from tankcal.inspection import rules
     from tankcal.job import rule_files
@@ -69,6 +70,7 @@ def names_that_ship():
         ("inspect", "--rule"): (rules.shipped_names(), True),
         ("compare", "--rule"): (rule_files.shipped_names(), True),
         ("report", "--language"): (LANGUAGES, False),
+        ("docs", "page"): (page_names(), False),
         ("run", "--cluster"): (("auto", "local"), False),
         ("camera convert", "--to"): (KINDS, False),
         ("camera convert", "--from"): (KINDS, False),
@@ -83,7 +85,7 @@ def mark(parser, named):
             for one in action.choices.values():
                 mark(one, named)
             continue
-        for option in action.option_strings:
+        for option in action.option_strings or (action.dest,):
             if (command, option) in named:
                 action.complete = _names_or_toml(*named[command, option])
         if action.nargs != 0 and action.choices is None and not hasattr(action, "complete"):
