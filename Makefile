@@ -85,10 +85,8 @@ site: notebooks $(VENV)/docs ## these pages, the executed notebooks and the API 
 	$(BIN)/python docs/stage.py build/site-source build/notebooks
 	$(BIN)/sphinx-build -q -W --keep-going -c docs -b html build/site-source build/site
 
-wheel: $(VENV)/full ## build the wheel and run the example from it, away from this checkout
-	rm -rf build/wheel && $(BIN)/pip wheel --quiet --no-deps --wheel-dir build/wheel .
-	$(BIN)/pip install --quiet --no-deps --target build/wheel/installed build/wheel/*.whl
-	cd build/wheel && PYTHONPATH=installed ../../$(BIN)/python -m tankcal demo --out from-wheel-results
+wheel: $(VENV)/release ## wheel and source archive in dist/, built twice and compared; run from the wheel, away from here
+	.ci/wheel $(TAG)
 
 $(VENV)/base: pyproject.toml constraints.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
@@ -99,9 +97,13 @@ $(VENV)/full: $(VENV)/base
 	$(BIN)/pip install --quiet --editable '.[test,check,images,clouds,cluster]'
 	touch $@
 
+$(VENV)/release: $(VENV)/full
+	$(BIN)/pip install --quiet --editable '.[release]'
+	touch $@
+
 $(VENV)/docs: $(VENV)/full
 	$(BIN)/pip install --quiet --editable '.[docs]'
 	touch $@
 
 clean: ## remove what was made, but not results of yours
-	rm -rf $(VENV) build demo-results .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) build dist demo-results .pytest_cache .ruff_cache .hypothesis .import_linter_cache

@@ -28,7 +28,7 @@ if TYPE_CHECKING:  # what a type checker reads; nothing of it runs
     from tankcal.report.outputs import write
     from tankcal.survey import Adjustment
 
-__version__ = "0.1.0"
+    __version__: str
 
 _ROOM_OF = {
     "load": "job",
@@ -65,6 +65,8 @@ __all__ = [
 
 
 def __getattr__(name: str):
+    if name == "__version__":
+        return import_module("tankcal.version").find_version()
     if name not in _ROOM_OF:
         raise AttributeError(f"module 'tankcal' has no attribute {name!r}")
     return getattr(import_module(f"tankcal.{_ROOM_OF[name]}"), name)

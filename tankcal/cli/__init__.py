@@ -8,10 +8,12 @@ import tankcal
 from tankcal.cli import (
     camera,
     comparing,
+    completing,
     exporting,
     importing,
     inspecting,
     linting,
+    pages,
     planning,
     reporting,
     running,
@@ -104,14 +106,31 @@ def _options(arguments):
     return options
 
 
+class _Version(argparse.Action):
+    """Prints the version, which is looked for only then."""
+
+    def __call__(self, parser, *_):
+        print(f"tankcal {tankcal.__version__}")
+        parser.exit()
+
+
 def _parser():
+    """The whole parser, in the language that is spoken."""
+    parser, translate = _parser_in_english()
+    translate(parser)
+    return parser
+
+
+def _parser_in_english():
+    """(the whole parser, what puts it into the language that is spoken)."""
     parser = argparse.ArgumentParser(
         prog="tankcal",
         description=DESCRIPTION,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"tankcal {tankcal.__version__}")
+    parser.add_argument("--version", action=_Version, nargs=0, default=argparse.SUPPRESS,
+                        help="show program's version number and exit")  # fmt: skip
     parser.set_defaults(command=None, shown=parser)
     commands = parser.add_subparsers(metavar="COMMAND")
 
@@ -119,6 +138,12 @@ def _parser():
     rooms = (running, reporting, starting, importing, planning, *tables, camera)
     for room in rooms:
         room.add(commands)
+    pages.add(commands)
+    completing.add(commands, _parser_in_english)
+    return parser, _translate
+
+
+def _translate(parser):
+    """Put a parser into the language that is spoken."""
     if words_of_run():
         put_in_words(parser, words_of_run())
-    return parser

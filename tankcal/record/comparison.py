@@ -4,11 +4,11 @@ What is said in words (steps, verdict, reasons, limits) stands here as codes wit
 sentences are the templates', in their language.
 """
 
-import tankcal
 from tankcal.record.plain_data import to_plain
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import Finite, Saved, key
 from tankcal.record.texts import WarningRecord
+from tankcal.version import find_version
 
 COMPARISON = SavedFormat("tankcal-comparison", 1, "comparison.json")  # so far one version
 
@@ -226,7 +226,7 @@ class ComparisonFile(Saved, kw_only=True):
     """A former table and a new one of the same tank, brought to one basis and judged."""
 
     format: str = key("see Versions", default=COMPARISON.format)
-    tankcal: str = key("version of tankcal", default=tankcal.__version__)
+    tankcal: str = key("version of tankcal", default_factory=find_version)
     tank: str | None = key("its id where a record has it")
     notice: str = key("that stands on every page of a record's papers, such as EXAMPLE")
     former: ComparedTable = key("the former table")

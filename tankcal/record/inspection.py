@@ -4,11 +4,11 @@ Every figure has its expanded uncertainty, every limit its source. What is said 
 verdicts, remarks) stands here as codes with their numbers; the sentences are the templates'.
 """
 
-import tankcal
 from tankcal.record.plain_data import to_plain
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import Finite, Saved, key
 from tankcal.record.texts import WarningRecord
+from tankcal.version import find_version
 
 INSPECTION = SavedFormat("tankcal-inspection", 1, "inspection.json")  # so far one version
 
@@ -175,7 +175,7 @@ class InspectionFile(Saved, kw_only=True):
     """What the survey says of the state of a tank, judged by a rule."""
 
     format: str = key("see Versions", default=INSPECTION.format)
-    tankcal: str = key("version of tankcal", default=tankcal.__version__)
+    tankcal: str = key("version of tankcal", default_factory=find_version)
     notice: str = key("that stands on every page, such as EXAMPLE")
     tank: InspectedTank = key("what was inspected")
     rule: InspectionRule | None = key("null: figures without limits")

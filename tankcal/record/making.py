@@ -5,7 +5,6 @@ import platform
 import numpy as np
 import scipy
 
-import tankcal
 from tankcal.job.model import InputFile
 from tankcal.job.model.parts import Course, Deadwood
 from tankcal.job.model.settings import (
@@ -34,6 +33,7 @@ from tankcal.record.tangents import TangentsRecord, tangents_of
 from tankcal.record.versions import FORMAT
 from tankcal.record.wall_shape import WallShapeRecord, shape_record
 from tankcal.tank.deliveries import WorstDeliveries
+from tankcal.version import find_version
 
 
 class Versions(Saved):
@@ -67,7 +67,7 @@ class Record(Saved, kw_only=True):
     """All that workbook and report need."""
 
     format: str = key("see Versions", default=FORMAT)
-    tankcal: str = key("version of tankcal", default=tankcal.__version__)
+    tankcal: str = key("version of tankcal", default_factory=find_version)
     versions: Versions = key("of python, numpy, scipy")
     files: list[InputFile] = key("everything that the job was read from")
     job: JobAsRead = key("the job as read, in SI")

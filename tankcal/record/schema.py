@@ -66,7 +66,7 @@ def filled_from(cls, source, **values):
     if source is None:
         return None
     for one in fields(cls):
-        if one.name not in values and one.default is MISSING:
+        if one.name not in values and one.default is one.default_factory is MISSING:
             found = attrgetter(one.metadata.get("of") or one.name)(source)
             times = one.metadata.get("times")
             scaled = times is not None and found is not None

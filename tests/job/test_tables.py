@@ -380,3 +380,22 @@ def test_the_sheet_job(tmp_path):
         (last - 1, "section"),
     ]
     assert raw.settings["tank"]["owner"].raw == 12
+
+
+@pytest.mark.parametrize("data", [b"# note; of the starter\na,b\n", b"a,b", b"a,b\n\n# c\n"])
+def test_a_heading_of_commas_with_nothing_below_is_read_in_a_job_of_semicolons(data):
+    log = Log()
+    table = read_csv("t.csv", data, ";", ",", log)
+    assert log.problems == []
+    assert (table.headings, table.rows) == (("a", "b"), ())
+
+
+def test_rows_below_a_heading_of_commas_are_not_guessed_at():
+    log = Log()
+    assert read_csv("t.csv", b"a,b\n1,2\n", ";", ",", log) is None
+    assert "separated by ','" in str(log.problems[0])
+
+
+def test_a_heading_of_semicolons_alone_stays_one_where_commas_are_declared():
+    log = Log()
+    assert read_csv("t.csv", b"a;b\n", ",", ".", log) is None

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal import __version__
+import tankcal
 from tankcal.messages import as_plain
 from tankcal.planning.changes import IMAGES
 from tankcal.record.plain_data import to_plain
@@ -48,7 +48,7 @@ class PlanPaper(PlainPaper):
                 date=str(self.plan.job.survey.date or ""),
                 language=self.words["language"]["code"],
                 running=[title, self.subject()],
-                footer=f"{self.words['page']['footer']} · tankcal {__version__}",
+                footer=f"{self.words['page']['footer']} · tankcal {tankcal.__version__}",
             ),
             blocks.masthead(title, self.subject()),
         ]

@@ -4,7 +4,7 @@ import io
 
 from xlsxwriter.utility import xl_range_abs
 
-from tankcal import __version__
+import tankcal
 from tankcal.report import numbers
 from tankcal.report.plain import Column
 from tankcal.report.planning import sketches
@@ -41,7 +41,7 @@ def _as_record(paper):
     """What a Book asks of a record: whose the workbook is, and the day."""
     job = paper.plan.job
     return {
-        "tankcal": __version__,
+        "tankcal": tankcal.__version__,
         "capacity": None,
         "job": {
             "certificate": {},

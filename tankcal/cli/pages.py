@@ -1,0 +1,54 @@
+"""`tankcal docs`: the pages of the documentation, which ship with the package."""
+
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+
+FOLDER = "docs"
+
+
+def add(commands):
+    """The parser of `tankcal docs`."""
+    parser = commands.add_parser(
+        "docs",
+        help="show the documentation that is installed",
+        description="Print a page of the documentation as text (Markdown), or, without a name, the "
+        "list of the pages and the folder that they are in. What help and messages call "
+        "docs/NAME.md is the page NAME.",
+    )
+    parser.add_argument("page", metavar="NAME", nargs="?", help="of a page, such as job-format")
+    parser.set_defaults(command=_docs)
+
+
+def page_names():
+    """Names of the pages, in alphabetical order."""
+    from tankcal.text.shipped import shipped_folder
+
+    return tuple(sorted(path.stem for path in shipped_folder(FOLDER).glob("*.md")))
+
+
+def _docs(options):
+    from tankcal.text.shipped import shipped_folder
+
+    names, folder = page_names(), shipped_folder(FOLDER)
+    if options.page is None:
+        for name in names:
+            print(f"{name:24}{_title(folder / f'{name}.md')}".rstrip())
+        print(folder)
+        return
+    name = options.page.removeprefix("docs/").removesuffix(".md")
+    if name not in names:
+        from tankcal.job.tables import nearest
+
+        text = message(
+            "page_unknown",
+            "no such page{hint}; expected one of those that tankcal docs lists",
+            hint=nearest(name, names),
+        )
+        raise InputError(Problem(options.page[:60], text))
+    print((folder / f"{name}.md").read_text(encoding="utf-8"), end="")
+
+
+def _title(path):
+    """The first heading of a page, without its mark."""
+    with path.open(encoding="utf-8") as lines:
+        return next((line[2:].strip() for line in lines if line.startswith("# ")), "")
