@@ -128,8 +128,8 @@ def _numbers(again):
         one = again.largest
         yield message(
             "verify_near_numbers",
-            "computed again: {count} numbers, {different} not the same bit for bit; the largest "
-            "difference for what is allowed is at {place}: {recorded} and now {computed}, "
+            "computed again: {count} numbers, {different} not the same bit for bit; measured by "
+            "what is allowed, the largest difference is at {place}: {recorded} and now {computed}, "
             "{relative} of the largest number there (at most {tolerance})",
             count=again.numbers,
             different=again.different,

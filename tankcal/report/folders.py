@@ -44,8 +44,8 @@ def refuse_foreign(directory, known):
 def replaced(directory, language=None):
     """A folder to write to that takes the place of `directory` when the block ends without error.
 
-    SHA256SUMS of all that was written is added. It lies beside `directory` (beside what a link points to), which is made when missing; what was
-    there before goes last.
+    SHA256SUMS of all that was written is added. The folder lies beside `directory` (beside what a
+    link points to), which is made when missing; what was there before goes last.
 
     language  that the papers were asked in; None: that of the job
     """

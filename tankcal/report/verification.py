@@ -160,11 +160,10 @@ def _results(found, folder, job, again, manifest):
     _inputs(found, record, job)
     if again is None:
         return
-    step, part = again
     _numbers(found, record, job, folder, again)
 
     def rebuild(place, language, letterhead):
-        outputs.rebuild(folder / RECORD, place, part, language, letterhead)
+        outputs.rebuild(folder / RECORD, place, again[1], language, letterhead)
 
     if (folder / PAGES[0]).is_file():  # not of a run without papers
         make_papers_again(found, folder, manifest, rebuild)
@@ -207,11 +206,16 @@ def _listed(found, folder, manifest):
             found.tell(name, text)
             continue
         found.add_compared(name)
-        if not found.is_told(name) and digest_of(folder / name) != manifest.digests[name]:
+        if not found.is_told(name) and not _is_listed(folder / name, manifest.digests[name]):
             text = message(
                 "verify_altered", "was altered: its SHA-256 is not the one in SHA256SUMS"
             )
             found.tell(name, text)
+
+
+def _is_listed(path, digest):
+    """Whether something is a file, no pipe or broken link, of that SHA-256."""
+    return path.is_file() and digest_of(path) == digest
 
 
 def _file(found, path, job, again):
