@@ -68,7 +68,7 @@ def compare_files(asked) -> ComparisonFile:
     log.stop_if_problems()
     if former.name == new.name:
         former, new = _with_folders((old, former), (recent, new))
-    fingerprints = tuple(sha256(_rows_of(one).read_bytes()).hexdigest() for one in (old, recent))
+    fingerprints = tuple(sha256(rows_file(one).read_bytes()).hexdigest() for one in (old, recent))
     return compare(former, new, rule=rule, courses=courses, fingerprints=fingerprints)
 
 
@@ -104,7 +104,7 @@ def _with_folders(*tables):
     return [table for _, table in tables]
 
 
-def _rows_of(path):
+def rows_file(path):
     """The file that holds the rows: beside a former.toml the one that it names."""
     if path.suffix.lower() != ".toml":
         return path

@@ -214,9 +214,13 @@ def saved_folder(found, folder, again, manifest):
     """
     from tankcal.record.camera_versions import CAMERA
     from tankcal.record.plan import PLAN
-    from tankcal.report import comparison, inspection
+    from tankcal.report import comparison, history, inspection
 
-    papers = ((comparison.comparison_file, comparison), (inspection.inspection_file, inspection))
+    papers = (
+        (comparison.comparison_file, comparison),
+        (inspection.inspection_file, inspection),
+        (history.history_file, history),
+    )
     for file_of, room in papers:
         path = file_of(folder)
         if path is None:
