@@ -74,9 +74,7 @@ def _history(options):
         refuse_foreign(options.out)
     show = Progress(options.quiet or options.machine)
     found = plain_of_history(
-        history_of_files(
-            options.sources, tanks=options.tank, dips_m=options.at, progress=show.part
-        )
+        history_of_files(options.sources, tanks=options.tank, dips_m=options.at, progress=show.part)
     )
     written = ()
     if options.out is not None:
@@ -98,22 +96,30 @@ def _tell(found):
     warn(paper.warning(one) for one in found["warnings"][:MOST_SHOWN])
     for one in found["left_out"][:MOST_SHOWN]:
         say(message("history_left_out", "not in the history: {text}", text=paper.warning(one)))
-    say(
-        message(
-            "history_span",
-            "{tank}: {count} certificates, {first} to {last}",
-            tank=found["tank"] or found["certificates"][-1]["file"],
-            count=len(found["certificates"]),
-            first=found["certificates"][0]["date"],
-            last=found["certificates"][-1]["date"],
-        )
-    )
+    say(_span(found))
     for one in found["certificates"]:
         say(_certificate(one))
     for one in found["changes"]:
         say(_change(one, paper))
     for one in found["inspections"]:
         say(_inspection(one))
+
+
+def _span(found):
+    certificates = found["certificates"]
+    tank = found["tank"] or certificates[-1]["file"]
+    if len(certificates) == 1:
+        return message(
+            "history_one", "{tank}: 1 certificate, {date}", tank=tank, date=certificates[0]["date"]
+        )
+    return message(
+        "history_span",
+        "{tank}: {count} certificates, {first} to {last}",
+        tank=tank,
+        count=len(certificates),
+        first=certificates[0]["date"],
+        last=certificates[-1]["date"],
+    )
 
 
 def _certificate(one):

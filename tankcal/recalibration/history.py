@@ -7,6 +7,7 @@ computed here that a comparison does not say.
 
 from dataclasses import dataclass
 from datetime import date
+from itertools import pairwise
 
 import numpy as np
 
@@ -137,7 +138,7 @@ def _comparisons(ordered, progress):
     """(each with the newest, each with the one before): lists of ComparisonFile."""
     newest, problems, found = ordered[-1].table, {}, ([], [])
     pairs = [(0, one.table, newest) for one in ordered]
-    pairs += [(1, a.table, b.table) for a, b in zip(ordered[:-1], ordered[1:], strict=True)]
+    pairs += [(1, a.table, b.table) for a, b in pairwise(ordered)]
     for done, (which, former, new) in enumerate(pairs):
         text = message("history_comparing", "comparing {count} tables", count=len(ordered))
         progress(text, done, len(pairs))

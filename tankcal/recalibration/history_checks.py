@@ -1,5 +1,7 @@
 """What deserves a look among the tables of one tank: days, names, sizes, zeros."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from tankcal.errors import Problem
@@ -17,14 +19,14 @@ def warnings_of_tables(ordered):
     >>> from tankcal.recalibration.former import FormerTable
     >>> from tankcal.recalibration.history import DatedTable
     >>> tables = [
-    ...     DatedTable(FormerTable(name, [0, 1], [0, 1], reference_height_m=x), "", date(2020, 1, 1))
-    ...     for name, x in (("a.csv", 9.1), ("b.csv", 9.2))
+    ...     DatedTable(FormerTable("a.csv", [0, 1], [0, 1], reference_height_m=x), "", date.min)
+    ...     for x in (9.1, 9.2)
     ... ]
     >>> [one.expected.code for one in warnings_of_tables(tables)]
     ['history_same_day', 'history_reference_height']
     """
     found = []
-    for before, one in zip(ordered[:-1], ordered[1:], strict=True):
+    for before, one in pairwise(ordered):
         found += _of_pair(before, one)
     return found
 

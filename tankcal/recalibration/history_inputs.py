@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
@@ -110,9 +111,9 @@ def find_files(paths, progress=None):
                 text = message("history_searching", "searching {folder}", folder=str(given))
                 progress(text, 0, 0)
             for path in _below(given, problems):
-                found.append((path, path.relative_to(given).as_posix(), True))
+                found.append((path, len(path.relative_to(given).parts)))
         elif given.is_file():
-            found.append((given, given.as_posix(), False))
+            found.append((given, 0))
         else:
             text = message(
                 "history_nothing_there",
@@ -122,11 +123,29 @@ def find_files(paths, progress=None):
             problems.append(Problem(given.name or str(given), text))
     if problems:
         raise InputError(problems)
-    several = len([one for one in paths if Path(one).is_dir()]) > 1
-    return [
-        (path, path.as_posix() if several and sought else name, sought)
-        for path, name, sought in found
-    ]
+    return _named(found)
+
+
+def _named(found):
+    """(path, name, whether it was found in a folder): by as many folders as tell files apart.
+
+    found  (path, least number of parts of the name; 0: it was not found in a folder) of each
+    """
+    places = {Path(os.path.abspath(path)).parts: least for path, least in reversed(found)}
+    tails, named = {}, []
+    for parts, least in reversed(places.items()):
+        count = max(least, 1)
+        while _count_tails(places, count, tails)[parts[-count:]] > 1:
+            count += 1
+        named.append((Path(*parts), "/".join(parts[-count:]), least > 0))
+    return named
+
+
+def _count_tails(places, count, known):
+    """How many places end in the same so many parts; `known` keeps what was counted."""
+    if count not in known:
+        known[count] = Counter(parts[-count:] for parts in places)
+    return known[count]
 
 
 def _below(folder, problems):
@@ -134,9 +153,9 @@ def _below(folder, problems):
 
     def tell(error):
         text = message(
-            "folder_cannot_be_read",
-            "the folder cannot be read ({strerror})",
-            strerror=error.strerror,
+            "history_folder_unreadable",
+            "a folder that cannot be read ({why}); expected one that can, or it left out",
+            why=error.strerror,
         )
         problems.append(Problem(str(error.filename), text))
 
@@ -154,6 +173,9 @@ def _read(found, path, name, tanks, seen, is_sought):
         return
     content = path.read_bytes()
     if is_sought and tanks and not any(_may_name(content, one) for one in tanks):
+        if content.rstrip()[-1:] != b"}":
+            text = message("history_cut_off", "is cut off: of which tank it was is not known")
+            found.left_out.append(Problem(name, text))
         return
     saved = _parsed(content, path)
     kind = str(saved.get("format") or "") if isinstance(saved, dict) else ""

@@ -104,8 +104,7 @@ def _line(ax, days, rows, number, count, keys, label):
     """One line with bars of U, moved aside a little, so that bars of one day do not hide others."""
     value, U, factor = keys
     times = np.array([days[one["certificate"]] for one in rows])
-    span = max(days.values()) - min(days.values()) or YEAR
-    times = times + APART * span * (number - (count - 1) / 2) / max(count, 1) * 2
+    times = times + _apart(days) * (number - (count - 1) / 2) / max(count, 1) * 2
     values = np.array([factor * one[value] for one in rows])
     bars = np.array([np.nan if one[U] is None else factor * one[U] for one in rows])
     style = line_style(number)
@@ -114,6 +113,13 @@ def _line(ax, days, rows, number, count, keys, label):
     if known.any():
         ax.errorbar(times[known], values[known], bars[known], fmt="none", capsize=1.5,
                     linewidth=0.6, color=style["color"])  # fmt: skip
+
+
+def _apart(days):
+    """Days by which lines are moved aside at most: less than the least time between two tables."""
+    times = np.unique(list(days.values()))
+    span = times[-1] - times[0] or YEAR
+    return min(APART * span, 0.3 * float(np.diff(times).min(initial=span)))
 
 
 def _days(found):

@@ -9,8 +9,8 @@ RADIUS_DECIMALS, MM_DECIMALS = 5, 2
 _SHOWN = {"sheet": True, "width": 11}
 
 
-def _day(key):
-    return Column(key, csv=key, text=lambda paper, row: row[key], **_SHOWN)
+def _day(key, on=None):
+    return Column(key, csv=key, text=lambda paper, row: row[key], on=on, **_SHOWN)
 
 
 def _number(key="certificate"):
@@ -41,14 +41,8 @@ CERTIFICATES = Table(
     "certificates",
     (
         Column("certificate", decimals=0, csv="certificate", on=f"certificates {_FACTS}", **_SHOWN),
-        Column("date", text=lambda paper, row: row["date"], csv="date", on="certificates", **_SHOWN),
-        Column(
-            "superseded",
-            text=lambda paper, row: row["superseded"],
-            csv="superseded",
-            on="certificates",
-            **_SHOWN,
-        ),
+        _day("date", on="certificates"),
+        _day("superseded", on="certificates"),
         _text("number", on="certificates"),
         _text("laboratory", on="certificates"),
         _text("method", width=40, on=""),

@@ -1,5 +1,7 @@
 """A history as a workbook: every certificate, volume, radius, change and check, to sort."""
 
+from dataclasses import replace
+
 from tankcal.report.history.tables import (
     CERTIFICATES,
     CHANGES,
@@ -14,6 +16,13 @@ from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.tables import columns_of, set_widths
 
 HEAD_ROW = 3
+OF_ORIGINS = ("certificate", "tank", "origin", "tankcal", "method", "file", "sha256")
+OF_TABLES = (
+    "certificate", "date", "superseded", "number", "laboratory", "top_dip_m", "top_volume_m3",
+    "U_top_m3", "k", "reference_temperature_c", "liquid_density_kg_m3", "reference_height_m",
+    "nominal_diameter_m", "nominal_height_m", "zero", "sigma0", "global_test_passed",
+    "rule_verdict",
+)  # fmt: skip
 
 
 def write(paper, path):
@@ -21,12 +30,14 @@ def write(paper, path):
     found = paper.found
     with Book(path, _as_record(paper), paper.words, about="history") as book:
         book.paper = paper
+        certificates = found["certificates"]
         sheets = {
-            "certificates": (CERTIFICATES, found["certificates"]),
+            "certificates": (CERTIFICATES.only(*OF_TABLES), certificates),
             "volumes": (VOLUMES, volume_rows(found)),
             "radii": (RADII, radius_rows(found)),
             "changes": (CHANGES, found["changes"]),
             "inspections": (CHECKS, check_rows(found)),
+            "origins": (replace(CERTIFICATES.only(*OF_ORIGINS), name="origins"), certificates),
         }
         for code, (table, rows) in sheets.items():
             if rows:
