@@ -54,6 +54,11 @@ def add(commands):
         "range that all tables have)",
     )
     history.add_argument(
+        "--courses",
+        metavar="FILE",
+        help="courses.csv of an upright tank, where no record has its courses",
+    )
+    history.add_argument(
         "--out", metavar="DIR", help="write history.json and papers there, all or nothing"
     )
     add_language(history)
@@ -74,7 +79,13 @@ def _history(options):
         refuse_foreign(options.out)
     show = Progress(options.quiet or options.machine)
     found = plain_of_history(
-        history_of_files(options.sources, tanks=options.tank, dips_m=options.at, progress=show.part)
+        history_of_files(
+            options.sources,
+            tanks=options.tank,
+            dips_m=options.at,
+            courses=options.courses,
+            progress=show.part,
+        )
     )
     written = ()
     if options.out is not None:

@@ -55,7 +55,9 @@ class DatedTable:
         return None if record is None else record["job"]["tank"].get("id")
 
 
-def history_of(tables, inspections=(), *, dips_m=None, left_out=(), warnings=(), progress=None):
+def history_of(
+    tables, inspections=(), *, dips_m=None, courses=None, left_out=(), warnings=(), progress=None
+):
     """The history of a tank.
 
     Parameters
@@ -65,6 +67,8 @@ def history_of(tables, inspections=(), *, dips_m=None, left_out=(), warnings=(),
     inspections : sequence of InspectionInHistory
     dips_m : sequence of float, optional
         That volumes are shown at; None: at fifths of the range that all tables have.
+    courses : (heights, thicknesses), optional
+        Of an upright tank, m, where no record has them.
     left_out, warnings : sequence of Problem
         Of finding and reading the files.
     progress : callable, optional
@@ -92,7 +96,7 @@ def history_of(tables, inspections=(), *, dips_m=None, left_out=(), warnings=(),
     """
     ordered = sorted(tables, key=_order)
     progress = progress or (lambda text, done, total: None)
-    on_newest, successive = _comparisons(ordered, progress)
+    on_newest, successive = _comparisons(ordered, courses, progress)
     k = coverage_factor_of(_with_u(ordered))
     rows = _shown_rows(on_newest, dips_m)
     newest = ordered[-1].table
@@ -134,7 +138,7 @@ def _with_u(ordered):
     return known[-1] if known else ordered[-1].table
 
 
-def _comparisons(ordered, progress):
+def _comparisons(ordered, courses, progress):
     """(each with the newest, each with the one before): lists of ComparisonFile."""
     newest, problems, found = ordered[-1].table, {}, ([], [])
     pairs = [(0, one.table, newest) for one in ordered]
@@ -143,7 +147,7 @@ def _comparisons(ordered, progress):
         text = message("history_comparing", "comparing {count} tables", count=len(ordered))
         progress(text, done, len(pairs))
         try:
-            found[which].append(compare(former, new))
+            found[which].append(compare(former, new, courses=courses))
         except InputError as error:
             problems |= dict.fromkeys(error.problems)
     if problems:

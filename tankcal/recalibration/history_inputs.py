@@ -10,9 +10,10 @@ from pathlib import Path
 
 from tankcal import record as records
 from tankcal.errors import InputError, Problem
+from tankcal.job.tables import Log
 from tankcal.messages import list_some, message
 from tankcal.recalibration.history import DatedTable, history_of
-from tankcal.recalibration.inputs import rows_file
+from tankcal.recalibration.inputs import read_shell, rows_file
 from tankcal.recalibration.reading import read_former
 from tankcal.record.history import CheckInHistory, InspectionInHistory
 from tankcal.record.inspection import INSPECTION
@@ -47,7 +48,7 @@ class Found:
     ids: dict = field(default_factory=dict)
 
 
-def history_of_files(paths, *, tanks=(), dips_m=None, progress=None):
+def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=None):
     """The history of the tank whose results lie in folders.
 
     Parameters
@@ -57,6 +58,8 @@ def history_of_files(paths, *, tanks=(), dips_m=None, progress=None):
         tables in any form that `read_former` reads, a former.toml with their date.
     tanks : sequence of str
         Ids of the tank; files of others are passed over. None: all files must be of one tank.
+    courses : path, optional
+        courses.csv of an upright tank, where no record has its courses.
     dips_m, progress : optional
         As of `history_of`.
 
@@ -83,6 +86,9 @@ def history_of_files(paths, *, tanks=(), dips_m=None, progress=None):
                 replace(one, file=name) if one.file in (path.name, RECORD) else one
                 for one in error.problems
             ]
+    log = Log()
+    shell = None if courses is None else read_shell(Path(courses), log)
+    found.problems += log.problems
     if found.problems:
         raise InputError(found.problems)
     _refuse_several(found, tanks, paths)
@@ -92,6 +98,7 @@ def history_of_files(paths, *, tanks=(), dips_m=None, progress=None):
         found.tables,
         found.inspections,
         dips_m=dips_m,
+        courses=shell,
         left_out=found.left_out,
         warnings=found.warnings,
         progress=progress,

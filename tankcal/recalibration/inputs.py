@@ -63,7 +63,7 @@ def compare_files(asked) -> ComparisonFile:
     log = Log()
     old, former = _table(asked.old, asked.former, log)
     recent, new = _table(asked.new, asked.new_former, log)
-    courses = None if asked.courses is None else _shell(asked.courses, log)
+    courses = None if asked.courses is None else read_shell(asked.courses, log)
     rule = None if asked.rule is None else named_rule(asked.rule, log)
     log.stop_if_problems()
     if former.name == new.name:
@@ -111,7 +111,7 @@ def rows_file(path):
     return path.parent / tomllib.loads(path.read_text(encoding="utf-8"))["former"]["file"]
 
 
-def _shell(path, log):
+def read_shell(path, log):
     """(heights, thicknesses) in a courses.csv, m, from the bottom up; None after telling `log`."""
     found = read_courses(path, log)
     if found is None:
