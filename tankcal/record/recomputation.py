@@ -113,7 +113,9 @@ def compute_again(record, job, step=None, part=None, cluster="auto"):
             adjustment = adjust_job(read, step)
             found = record_of_adjustment(read, adjustment)
         else:
-            result = run(load(place), step, part_progress=part, cluster=cluster)
+            simulated = None if record["monte_carlo"] else False  # it may have been left out
+            options = {"part_progress": part, "simulated": simulated, "cluster": cluster}
+            result = run(load(place), step, **options)
             found, adjustment = record_of(result), result.adjustment
     return compare_records(record, found), adjustment
 

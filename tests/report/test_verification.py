@@ -7,10 +7,16 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
+from compared_tables import plain
+from job_builder import write_job, write_workbook
+from test_adjustment_outputs import write_station
 
+import tankcal
 from tankcal.cli import main
 from tankcal.errors import InputError
+from tankcal.report.comparison import write_comparison
 from tankcal.report.verification import verify
 
 pytestmark = pytest.mark.slow
@@ -291,3 +297,104 @@ def test_papers_in_another_language_come_out_again(job, tmp_path):
                  "--out", str(tmp_path / "es")]) == 0  # fmt: skip
     found = verify(tmp_path / "es", job)
     assert (found.problems, found.papers_again, found.recomputed.different) == ([], True, 0)
+
+
+def run_small(job, out, **options):
+    """A small job, record and tables only."""
+    return tankcal.write(tankcal.run(tankcal.load(job), **options), out, papers=False)
+
+
+def test_a_run_without_monte_carlo_comes_out_again(tmp_path):
+    """The record has none though its job asks for it: what was left out is left out again."""
+    job = write_job(tmp_path / "job", settings={"table.step_m": 0.1})
+    run_small(job, job / "results", simulated=False)
+    found = verify(job / "results")
+    assert (found.problems, found.recomputed.otherwise) == ([], ())
+
+
+def test_the_job_of_a_workbook_comes_out_again(tmp_path):
+    book = tmp_path / "tank.xlsx"
+    write_workbook(book, settings={"table.step_m": 0.1})
+    run_small(book, tmp_path / "tank-results")
+    for given in (None, tmp_path, book):
+        found = verify(tmp_path / "tank-results", given)
+        assert (found.problems, found.inputs_found) == ([], True)
+        assert found.recomputed.different == 0
+
+
+def test_a_record_that_names_files_elsewhere_writes_nothing_there(tmp_path):
+    """Names with .. are read where they are, never linked."""
+    job = write_job(tmp_path / "job", settings={"table.step_m": 0.1})
+    run_small(job, job / "results")
+
+    def elsewhere(record):
+        record["files"][0]["file"] = "../job/" + record["files"][0]["file"]
+
+    change_record(job / "results", elsewhere)
+    before = sorted(tmp_path.rglob("*"))
+    found = verify(job / "results")
+    assert sorted(tmp_path.rglob("*")) == before
+    codes = {one.expected.code for one in found.problems}
+    assert codes == {"verify_text_apart"}
+
+
+def test_a_job_that_this_version_refuses_is_told(tmp_path):
+    job = write_job(tmp_path / "job", settings={"table.step_m": 0.1})
+    run_small(job, job / "results")
+    text = (job / "job.toml").read_text(encoding="utf-8") + "\n[unheard]\nx = 1\n"
+    (job / "job.toml").write_text(text, encoding="utf-8")
+
+    def of_the_changed_file(record):
+        for one in record["files"]:
+            one["sha256"] = sha256_of(job / one["file"])
+
+    change_record(job / "results", of_the_changed_file)
+    found = verify(job / "results")
+    assert next(one.expected.code for one in found.problems) == "verify_not_computed"
+    assert "unheard" in str(found.problems[0])
+
+
+def test_papers_with_a_letterhead_come_out_again(job, tmp_path):
+    head = tmp_path / "lab.toml"
+    head.write_text('[laboratory]\nname = "Lab X"\naddress = ["A 1"]\n', encoding="utf-8")
+    out = tmp_path / "headed"
+    arguments = ("--letterhead", str(head), "--quiet", "--out", str(out))
+    assert main(["report", str(job / "results"), *arguments]) == 0
+    found = verify(out)
+    assert (found.problems, found.papers_again, found.inputs_found) == ([], True, False)
+    (out / "letterhead.json").write_text("{", encoding="utf-8")
+    assert next(one.file for one in verify(out).problems) == "letterhead.json"
+
+
+def test_an_adjusted_survey_alone_comes_out_again_with_its_covariance(tmp_path, job_station):
+    results = job_station / "results"
+    assert main(["run", str(job_station), "--only", "adjustment", "--no-papers", "--quiet"]) == 0
+    found = verify(results)
+    assert (found.problems, found.recomputed.different) == ([], 0)
+    assert "points_cov.npz" in found.compared
+    with np.load(results / "points_cov.npz") as held:
+        matrix, points = 1.1 * held["covariance_m2"], held["points"]
+    np.savez(results / "points_cov.npz", covariance_m2=matrix, points=points)
+    write_sums_again(results)
+    codes = [one.expected.code for one in verify(results).problems]
+    assert codes == ["verify_covariance_apart"]
+
+
+@pytest.fixture
+def job_station(tmp_path):
+    """A small survey by a total station."""
+    return write_station(tmp_path / "station")
+
+
+def test_other_folders_say_what_cannot_be_verified(tmp_path):
+    """A comparison: hashes and papers; its tables lie nobody knows where."""
+    out = tmp_path / "c"
+    write_comparison(plain(), out, "pt-BR")
+    found = verify(out)
+    assert (found.problems, found.papers_again) == ([], True)
+    assert [one.code for one in found.notes] == ["verify_not_from_inputs"]
+    (out / "comparison.html").write_bytes(b"x")
+    assert [one.file for one in verify(out).problems] == ["comparison.html"]
+    (out / "comparison.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError):
+        verify(out)
