@@ -12,6 +12,7 @@ from tankcal.record.camera_product import ProductFile
 from tankcal.record.camera_stability import StabilityFile
 from tankcal.record.camera_versions import CAMERA
 from tankcal.record.comparison import COMPARISON, ComparisonFile
+from tankcal.record.history import HISTORY, HistoryFile
 from tankcal.record.inspection import INSPECTION, InspectionFile
 from tankcal.record.making import Record
 from tankcal.record.plan import PLAN, PlanFile
@@ -29,6 +30,7 @@ SAVED = (
     (WALL_PLAN, None, WallPlanFile),
     (COMPARISON, None, ComparisonFile),
     (INSPECTION, None, InspectionFile),
+    (HISTORY, None, HistoryFile),
 )
 
 

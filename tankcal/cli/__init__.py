@@ -10,6 +10,7 @@ from tankcal.cli import (
     comparing,
     completing,
     exporting,
+    history,
     importing,
     inspecting,
     linting,
@@ -42,6 +43,7 @@ a new tank, step by step:
   tankcal lint table.csv        look for mistakes in any capacity table
   tankcal read-table old.csv --courses courses.csv   radii and head out of a former table
   tankcal compare old.csv my-tank/results        has the tank changed since its former table?
+  tankcal history archive --tank TK-1            its tables, radii and verdicts over the years
   tankcal verify my-tank/results                 do the files of a run belong together?
   tankcal export my-tank/results --profile NAME   the table as a gauging system takes it
   tankcal inspect my-tank                      plumb, roundness and settlement by the same survey
@@ -134,7 +136,7 @@ def _parser_in_english():
     parser.set_defaults(command=None, shown=parser)
     commands = parser.add_subparsers(metavar="COMMAND")
 
-    tables = (linting, table_reading, comparing, exporting, inspecting, verifying)
+    tables = (linting, table_reading, comparing, history, exporting, inspecting, verifying)
     rooms = (running, reporting, starting, importing, planning, *tables, camera)
     for room in rooms:
         room.add(commands)

@@ -101,6 +101,20 @@ def parse_cluster(text):
     return text
 
 
+def parse_dips(text):
+    """Dips in metres with commas between, not below 0."""
+    values = [_number(one) for one in text.split(",")]
+    if not all(0 <= value < float("inf") for value in values):
+        raise refuse_argument(
+            message(
+                "option_dips",
+                "found {text!r}; expected dips in metres such as 2.5,5,7.5",
+                text=text,
+            )
+        )
+    return values
+
+
 def refuse_argument(text):
     """The error of an argument, in the language that is spoken."""
     return argparse.ArgumentTypeError(say_in_language(text))

@@ -13,14 +13,16 @@ def add(commands):
         help="write the papers again, from a record",
         description="Write workbook, notebook, PDFs, web page and CSV files again, all or "
         "nothing, from record.json alone, or the papers of a comparison from comparison.json, of "
-        "an inspection from inspection.json: nothing is computed again.",
+        "an inspection from inspection.json, of a history from history.json: nothing is computed "
+        "again.",
         epilog="exit status: 0 done; 2 the record, the language or the letterhead cannot be used. "
         "Then nothing is written.",
     )
     report.add_argument(
         "record",
         metavar="RECORD",
-        help="a record.json, comparison.json or inspection.json, or a folder of results",
+        help="a record.json, comparison.json, inspection.json or history.json, or a folder of "
+        "results",
     )
     report.add_argument(
         "--out",
@@ -56,13 +58,14 @@ def letterhead_of(options):
 
 
 def _report(options):
-    from tankcal.report import comparison, inspection, outputs
+    from tankcal.report import comparison, history, inspection, outputs
 
     show = Progress(options.quiet)
     letterhead = letterhead_of(options)
     others = (
         (comparison.comparison_file(options.record), comparison.rebuild),
         (inspection.inspection_file(options.record), inspection.rebuild),
+        (history.history_file(options.record), history.rebuild),
     )
     for saved, rebuild in others:
         if saved is not None:

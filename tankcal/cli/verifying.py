@@ -1,8 +1,10 @@
-"""`tankcal verify`: whether the files of a run belong together."""
+"""`tankcal verify`: whether the files of a run belong together, and come out again."""
+
+from dataclasses import asdict
 
 from tankcal.cli.arguments import add_language
 from tankcal.cli.machine import add_json, print_json, problem_of
-from tankcal.cli.showing import prepare_for_small_work, say, speak_of_record
+from tankcal.cli.showing import Progress, prepare_for_small_work, say, speak_of_record
 from tankcal.messages import message
 
 
@@ -10,22 +12,32 @@ def add(commands):
     """The parser of `tankcal verify`."""
     verify = commands.add_parser(
         "verify",
-        help="check that the files of a run belong together, by their hashes",
-        description="Compare the SHA-256 of record.json with those that PDFs, workbook, digital "
-        "certificate and web page name, what a PDF holds inside with the files beside it, the CSV "
-        "files with the record, and the input files of the job, where it is at hand, with those of "
-        "the record. One line a disagreement. Nothing is computed again.",
+        help="check that the files of a run belong together, and come out again",
+        description="Hold every file of a folder of results against SHA256SUMS, the papers "
+        "against what the record gives when they are made again, the input files of the job, "
+        "where it is at hand, against the hashes in the record, and every number of the record "
+        "against the job computed again. One line a disagreement.",
         epilog="exit status: 0 all agree; 2 something does not, or there is nothing to compare.",
     )
     verify.add_argument(
-        "results", metavar="RESULTS", help="a folder of results, or one of its PDFs"
+        "results",
+        metavar="RESULTS",
+        help="a folder that tankcal wrote: results, a comparison, an inspection, a history, a "
+        "plan, the camera; or a PDF of results",
     )
     verify.add_argument(
         "--job",
         metavar="DIR",
-        help="folder of the input files (default: the one that the results lie in)",
+        help="folder of the input files, or the job's workbook (default: the folder that the "
+        "results lie in)",
+    )
+    verify.add_argument(
+        "--hashes-only",
+        action="store_true",
+        help="compare hashes only: no paper is made again, no number computed again",
     )
     add_language(verify)
+    verify.add_argument("--quiet", action="store_true", help="no progress, only problems")
     add_json(verify)
     verify.set_defaults(command=_verify)
 
@@ -35,32 +47,125 @@ def _verify(options):
     speak_of_record(options.language, options.results)
     from tankcal.report.verification import verify
 
-    found = verify(options.results, options.job)
+    show = Progress(options.quiet or options.machine)
+    found = verify(
+        options.results,
+        options.job,
+        hashes_only=options.hashes_only,
+        step=show.step,
+        part=show.part,
+    )
+    show.end()
     status = 2 if found.problems else 0
     if options.machine:
-        print_json(
-            exit_status=status,
-            record_sha256=found.digest,
-            compared=found.compared,
-            inputs_compared=found.inputs_found,
-            problems=[problem_of(one) for one in found.problems],
-        )
-        return status
+        _print(found, status)
+    else:
+        _tell(found, options.hashes_only)
+    return status
+
+
+def _print(found, status):
+    again = found.recomputed
+    print_json(
+        exit_status=status,
+        record_sha256=found.digest,
+        manifest_sha256=found.manifest_sha256,
+        compared=found.compared,
+        inputs_compared=found.inputs_found,
+        papers_made_again=found.papers_again,
+        recomputed=None
+        if again is None
+        else {
+            "made_by": again.made_by,
+            "computed_by": again.computed_by,
+            "numbers": again.numbers,
+            "different": again.different,
+            "largest": None if again.largest is None else _finite(asdict(again.largest)),
+            "agrees": again.agrees,
+        },
+        notes=[str(one) for one in found.notes],
+        problems=[problem_of(one) for one in found.problems],
+    )
+
+
+def _finite(values):
+    return {key: None if value == float("inf") else value for key, value in values.items()}
+
+
+def _tell(found, hashes_only):
     for one in found.problems:
         say(one.text)
-    if not found.inputs_found:
-        say(message("verify_no_inputs", "the input files of the job are not here: not compared"))
+    if found.recomputed is not None:
+        for line in _numbers(found.recomputed):
+            say(line)
+    elif found.saved_file == "record.json" and not found.inputs_found:
+        say(
+            message(
+                "verify_no_inputs",
+                "the input files of the job are not here: neither compared nor computed again",
+            )
+        )
+    for one in found.notes:
+        say(one)
+    if found.papers_again:
+        say(message("verify_papers_again", "the papers were made again and held against these"))
+    if hashes_only:
+        say(
+            message("verify_hashes_only", "hashes only: no paper made and no number computed again")
+        )
+    _sum(found)
+
+
+def _numbers(again):
+    """What came of the numbers, and which versions made them."""
+    if again.different == 0:
+        yield message(
+            "verify_same_numbers",
+            "computed again: {count} numbers, all the same bit for bit",
+            count=again.numbers,
+        )
+    else:
+        one = again.largest
+        yield message(
+            "verify_near_numbers",
+            "computed again: {count} numbers, {different} not the same bit for bit; measured by "
+            "what is allowed, the largest difference is at {place}: {recorded} and now {computed}, "
+            "{relative} of the largest number there (at most {tolerance})",
+            count=again.numbers,
+            different=again.different,
+            place=one.place,
+            recorded=f"{one.recorded:.12g}",
+            computed=f"{one.computed:.12g}",
+            relative=f"{one.relative:.1e}",
+            tolerance=f"{one.tolerance:.0e}",
+        )
+    made, now = (", ".join(f"{name} {version}" for name, version in versions.items())
+                 for versions in (again.made_by, again.computed_by))  # fmt: skip
+    if made == now:
+        yield message(
+            "verify_same_versions", "made and computed again by {versions}", versions=made
+        )
+    else:
+        yield message(
+            "verify_other_versions", "made by {made}; computed again by {now}", made=made, now=now
+        )
+
+
+def _sum(found):
     if found.problems:
         count = len(found.problems)
         text = message("verify_disagree", "{count} disagreements", count=count)
         say(message("verify_disagrees", "1 disagreement") if count == 1 else text)
-    else:
-        say(
-            message(
-                "verify_agree",
-                "{count} files compared, all agree: record.json is sha256:{digest}",
-                count=len(found.compared),
-                digest=found.digest,
-            )
+        return
+    say(
+        message(
+            "verify_agree",
+            "{count} files compared, all agree: {file} is sha256:{digest}",
+            count=len(found.compared),
+            file=found.saved_file,
+            digest=found.digest or found.manifest_sha256,
         )
-    return status
+    )
+    if found.manifest_sha256 and found.digest:
+        say(message("verify_manifest", "SHA256SUMS is sha256:{digest}",
+                    digest=found.manifest_sha256))  # fmt: skip

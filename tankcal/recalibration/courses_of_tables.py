@@ -32,8 +32,8 @@ def compared_courses(facts, basis, former_U, new_U, c, sd_m3):
     rounding = found.u_areas_m2 / (2 * np.pi * new)
     courses = []
     for k in np.flatnonzero(np.isfinite(changes)):
-        u = _u_of_tables(basis, former_U, new_U, c, edges[k : k + 2], new[k])
-        u = None if u is None else float(np.hypot(u, rounding[k]))
+        parts = _u_of_tables(basis, (former_U, new_U), edges[k : k + 2], new[k])
+        u = None if None in parts else float(np.hypot(_u_of_change(*parts, c), rounding[k]))
         courses.append(
             ComparedCourse(
                 course=int(k) + 1,
@@ -45,6 +45,8 @@ def compared_courses(facts, basis, former_U, new_U, c, sd_m3):
                 u_m=u,
                 u_rounding_m=float(rounding[k]),
                 w=float(changes[k] / u) if u else None,
+                u_former_m=parts[0],
+                u_new_m=parts[1],
             )
         )
     return courses
@@ -63,22 +65,21 @@ def _radii(facts, basis):
     return radii_of_rows(rings, basis.height_m, basis.new_m3, density, zone)
 
 
-def _u_of_tables(basis, former_U, new_U, c, ends, radius):
-    """Standard uncertainty of a change of radius by those of what the course holds; or None.
+def _u_of_tables(basis, tables, ends, radius):
+    """Standard uncertainty of a radius by the volume of its course in each table; None: unknown.
 
     u(r) = r u(V) / (2 V), V between the lowest and the highest row within the course.
     """
     dips = basis.height_m
     inside = np.flatnonzero((dips >= ends[0] - 1e-9) & (dips <= ends[1] + 1e-9) & basis.for_use)
     if len(inside) < 2:
-        return None
+        return [None for _ in tables]
     low, high = inside[:1], inside[-1:]
     volume = basis.new_m3[high[0]] - basis.new_m3[low[0]]
-    parts = [
-        radius / 2 * float(one.deliveries(low, high)[0]) / one.k / volume
-        for one in (former_U, new_U)
-    ]
-    if np.isnan(parts).any():
-        return None
-    variance = parts[0] ** 2 + parts[1] ** 2 - 2 * c * parts[0] * parts[1]
-    return float(np.sqrt(max(variance, 0.0)))
+    found = [radius / 2 * float(one.deliveries(low, high)[0]) / one.k / volume for one in tables]
+    return [None if np.isnan(one) else one for one in found]
+
+
+def _u_of_change(former, new, c):
+    """Standard uncertainty of the difference of two radii, c being the correlation."""
+    return float(np.sqrt(max(former**2 + new**2 - 2 * c * former * new, 0.0)))

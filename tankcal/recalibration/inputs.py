@@ -63,12 +63,12 @@ def compare_files(asked) -> ComparisonFile:
     log = Log()
     old, former = _table(asked.old, asked.former, log)
     recent, new = _table(asked.new, asked.new_former, log)
-    courses = None if asked.courses is None else _shell(asked.courses, log)
+    courses = None if asked.courses is None else read_shell(asked.courses, log)
     rule = None if asked.rule is None else named_rule(asked.rule, log)
     log.stop_if_problems()
     if former.name == new.name:
         former, new = _with_folders((old, former), (recent, new))
-    fingerprints = tuple(sha256(_rows_of(one).read_bytes()).hexdigest() for one in (old, recent))
+    fingerprints = tuple(sha256(rows_file(one).read_bytes()).hexdigest() for one in (old, recent))
     return compare(former, new, rule=rule, courses=courses, fingerprints=fingerprints)
 
 
@@ -104,14 +104,14 @@ def _with_folders(*tables):
     return [table for _, table in tables]
 
 
-def _rows_of(path):
+def rows_file(path):
     """The file that holds the rows: beside a former.toml the one that it names."""
     if path.suffix.lower() != ".toml":
         return path
     return path.parent / tomllib.loads(path.read_text(encoding="utf-8"))["former"]["file"]
 
 
-def _shell(path, log):
+def read_shell(path, log):
     """(heights, thicknesses) in a courses.csv, m, from the bottom up; None after telling `log`."""
     found = read_courses(path, log)
     if found is None:

@@ -136,6 +136,15 @@ class ComparedCourse(Saved):
     u_m: float | None = key("standard uncertainty of d, of both tables; null: not known")
     u_rounding_m: float | None = key("the part of it that scatter and rounding of rows leave")
     w: float | None = key("d over u_m; null: not known")
+    u_former_m: float | None = key(
+        "standard uncertainty of the former radius, by U of what the course holds; left out where "
+        "it is not known",
+        optional=True,
+        default=None,
+    )
+    u_new_m: float | None = key(
+        "the same of the new radius; left out where it is not known", optional=True, default=None
+    )
 
 
 class Waterfall(Saved):

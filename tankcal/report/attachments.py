@@ -16,6 +16,8 @@ KINDS = {  # name of the file: MIME type, what it is to the paper (PDF 2.0, 7.11
     "comparison.xlsx": (_WORKBOOK, "data"),
     "inspection.json": ("application/json", "source"),
     "inspection.xlsx": (_WORKBOOK, "data"),
+    "history.json": ("application/json", "source"),
+    "history.xlsx": (_WORKBOOK, "data"),
 }
 OF_RECORD = ("record.json", "capacity.xlsx", "adjustment.xlsx", "certificate.xml")
 LARGEST = 20_000_000  # bytes: a larger file stays beside the PDF, which names its digest

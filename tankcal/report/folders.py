@@ -7,10 +7,14 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.report import manifest
 
 
 def refuse_foreign(directory, known):
-    """Raise InputError when `directory` exists and holds a file that is not among `known`."""
+    """Raise InputError when `directory` exists and holds a file that is not among `known`.
+
+    SHA256SUMS is always known.
+    """
     directory = Path(directory)
     if not directory.exists():
         return
@@ -19,7 +23,9 @@ def refuse_foreign(directory, known):
         raise InputError(
             Problem(name, message("out_is_a_file", "is a file; expected a folder for the results"))
         )
-    foreign = sorted(path.name for path in directory.iterdir() if path.name not in known)
+    foreign = sorted(
+        path.name for path in directory.iterdir() if path.name not in (*known, manifest.FILE)
+    )
     if foreign:
         raise InputError(
             Problem(
@@ -35,17 +41,20 @@ def refuse_foreign(directory, known):
 
 
 @contextmanager
-def replaced(directory):
+def replaced(directory, language=None):
     """A folder to write to that takes the place of `directory` when the block ends without error.
 
-    It lies beside `directory` (beside what a link points to), which is made when missing; what was
-    there before goes last.
+    SHA256SUMS of all that was written is added. The folder lies beside `directory` (beside what a
+    link points to), which is made when missing; what was there before goes last.
+
+    language  that the papers were asked in; None: that of the job
     """
     target = Path(directory).resolve()
     target.parent.mkdir(parents=True, exist_ok=True)
     temporary = Path(tempfile.mkdtemp(prefix=".tankcal-", dir=target.parent))
     try:
         yield temporary
+        manifest.write_manifest(temporary, language)
         temporary.chmod(0o755)
         _swap(temporary, target)
     finally:

@@ -1,7 +1,8 @@
-"""Whether the files of a run belong together: by the hashes that each of them names.
+"""Whether the files of a run belong together, and come out again.
 
-What is compared is only what is there. That all hashes agree shows that the papers are of this
-record, and the record of these input files; who made them, only a signature shows.
+By the hashes that each of them names, by SHA256SUMS, by making the papers again from the record,
+and by computing the record again from the input files. That all agree shows that the papers are of
+this record, and the record of these input files; who made them, only a signature shows.
 """
 
 import io
@@ -15,14 +16,22 @@ from xml.etree import ElementTree
 import tankcal
 from tankcal import record as records
 from tankcal.errors import InputError, Problem, TankcalError
-from tankcal.messages import message
-from tankcal.report import dcc
+from tankcal.messages import Message, message
+from tankcal.record.recomputation import Recomputation, input_folder
+from tankcal.report import dcc, outputs
 from tankcal.report.attachments import KINDS, sha256
+from tankcal.report.manifest import digest_of, files_below, read_manifest
 from tankcal.report.outputs import RECORD, WORKBOOKS, tables
+from tankcal.report.verified_again import (
+    compute_numbers_again,
+    make_papers_again,
+    saved_folder,
+)
 from tankcal.report.workbook.book import RECORD_PROPERTY
 
 PDFS = ("certificate.pdf", "working-papers.pdf", "field-table.pdf", "report.pdf")
 PAGES = ("report.html", "report.ipynb")
+INPUT_CODES = ("verify_input_missing", "verify_input_changed")
 _HASH = re.compile(r"sha256:([0-9a-f]{64})")
 _DCC = f"{{{dcc.DCC}}}"
 
@@ -41,27 +50,60 @@ class Verification:
         One for each disagreement.
     inputs_found : bool
         Whether any input file of the job was at hand.
+    saved_file : str
+        Name of the file that all else was made from.
+    manifest_sha256 : str or None
+        SHA-256 of SHA256SUMS; None: there is none.
+    papers_again : bool
+        Whether the papers were made again.
+    recomputed : record.recomputation.Recomputation or None
+        What came of computing the job again; None: it was not.
+    notes : list of Message
+        What could not be verified, and why.
     """
 
     digest: str | None = None
     compared: list[str] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
     inputs_found: bool = False
+    saved_file: str = RECORD
+    manifest_sha256: str | None = None
+    papers_again: bool = False
+    recomputed: Recomputation | None = None
+    notes: list[Message] = field(default_factory=list)
 
     def tell(self, name, text):
         """Add a disagreement: the file, and what is wrong with it."""
         self.problems.append(Problem(name, text))
 
+    def note(self, text):
+        """Add something that could not be verified."""
+        self.notes.append(text)
 
-def verify(path, job=None):
+    def is_told(self, name):
+        """Whether something is wrong with a file."""
+        return any(one.file == name for one in self.problems)
+
+    def add_compared(self, name):
+        """Count a file once."""
+        if name not in self.compared:
+            self.compared.append(name)
+
+
+def verify(path, job=None, *, hashes_only=False, step=None, part=None):
     """Compare the files of a folder of results, or a PDF with what it holds inside.
 
     Parameters
     ----------
     path : path
-        Folder of results, or a PDF of one; files beside the PDF are compared with what it holds.
+        Folder of results, of a comparison, an inspection, a history, a plan or the camera; or a
+        PDF of results: files beside it are compared with what it holds.
     job : path, optional
-        Folder of the input files; None: the one that the results lie in.
+        Folder of the input files, or the job's workbook; None: the folder that the results lie in.
+    hashes_only : bool, optional
+        True: no paper is made again, and no number computed again.
+    step, part : callable, optional
+        Progress: step(text), part(text, done, total).
 
     Returns
     -------
@@ -70,27 +112,37 @@ def verify(path, job=None):
     Raises
     ------
     InputError
-        For a path that is neither, and for a record that cannot be read.
+        For a path that is neither, and for a saved file that cannot be read.
     """
     path = Path(path)
     found = Verification()
+    again = None if hashes_only else (step, part)
     if path.is_dir():
-        _folder(found, path, Path(job) if job else path.resolve().parent)
+        inputs = input_folder(job) if job else path.resolve().parent
+        _folder(found, path, inputs, again)
     elif path.is_file():
-        _file(found, path, Path(job) if job else None)
+        _file(found, path, input_folder(job) if job else None, again)
     else:
         text = message("verify_nothing", "is not there; expected a folder of results or a PDF")
         raise InputError(Problem(path.name or str(path), text))
     return found
 
 
-def _folder(found, folder, job):
-    content = _read(folder / RECORD)
-    if content is None:
+def _folder(found, folder, job, again):
+    manifest = read_manifest(folder)
+    found.manifest_sha256 = manifest and manifest.sha256
+    if (folder / RECORD).is_file():
+        _results(found, folder, job, again, manifest)
+    elif not saved_folder(found, folder, again, manifest):
         text = message("verify_no_record", "is missing; expected the record of the results")
         raise InputError(Problem(RECORD, text))
+    _listed(found, folder, manifest)
+
+
+def _results(found, folder, job, again, manifest):
+    """A folder of results: by the hashes that its files name, its papers and numbers made again."""
     record = records.load(folder / RECORD)
-    found.digest = sha256(content)
+    found.digest = sha256((folder / RECORD).read_bytes())
     found.compared.append(RECORD)
     beside = {name: folder / name for name in KINDS}
     for name in PDFS:
@@ -106,9 +158,67 @@ def _folder(found, folder, job):
             _page(found, name, (folder / name).read_bytes())
     _tables(found, folder, record)
     _inputs(found, record, job)
+    if again is None:
+        return
+    _numbers(found, record, job, folder, again)
+
+    def rebuild(place, language, letterhead):
+        outputs.rebuild(folder / RECORD, place, again[1], language, letterhead)
+
+    if (folder / PAGES[0]).is_file():  # not of a run without papers
+        make_papers_again(found, folder, manifest, rebuild)
 
 
-def _file(found, path, job):
+def _numbers(found, record, job, folder, again):
+    """Compute the job again where all of its input files are those of the record."""
+    files = {one["file"] for one in record["files"]}
+    if not found.inputs_found:
+        return
+    if any(one.file in files and one.expected.code in INPUT_CODES for one in found.problems):
+        text = message(
+            "verify_inputs_differ",
+            "the input files are not those of the record: nothing was computed again",
+        )
+        found.note(text)
+        return
+    step, part = again
+    compute_numbers_again(found, record, job, folder=folder, step=step, part=part)
+
+
+def _listed(found, folder, manifest):
+    """Every file of the folder by SHA256SUMS: missing, extra, altered."""
+    if manifest is None:
+        text = message(
+            "verify_no_manifest_here",
+            "no SHA256SUMS, which lists every file: files that are missing, extra or altered may "
+            "not be seen",
+        )
+        found.note(text)
+        return
+    there = files_below(folder)
+    for name in manifest.digests:
+        if name not in there:
+            text = message("verify_missing", "is missing; SHA256SUMS lists it")
+            found.tell(name, text)
+    for name in there:
+        if name not in manifest.digests:
+            text = message("verify_extra", "is extra; SHA256SUMS does not list it")
+            found.tell(name, text)
+            continue
+        found.add_compared(name)
+        if not found.is_told(name) and not _is_listed(folder / name, manifest.digests[name]):
+            text = message(
+                "verify_altered", "was altered: its SHA-256 is not the one in SHA256SUMS"
+            )
+            found.tell(name, text)
+
+
+def _is_listed(path, digest):
+    """Whether something is a file, no pipe or broken link, of that SHA-256."""
+    return path.is_file() and digest_of(path) == digest
+
+
+def _file(found, path, job, again):
     """A PDF with what it holds inside: its record counts, and files beside it are compared."""
     held = _pdf(found, path.name, path.read_bytes(), {n: path.with_name(n) for n in KINDS})
     if RECORD not in held:
@@ -130,6 +240,8 @@ def _file(found, path, job):
         _certificate(found, f"{path.name}: {dcc.FILE}", held[dcc.FILE], record)
     if job:
         _inputs(found, record, job)
+        if again is not None:
+            _numbers(found, record, job, None, again)
 
 
 def _read(path):
@@ -331,7 +443,7 @@ def _inputs(found, record, job):
             )
             continue
         found.compared.append(name)
-        digest = _digest_of(there[name])
+        digest = digest_of(there[name])
         if digest != one["sha256"]:
             found.tell(
                 name,
@@ -342,11 +454,3 @@ def _inputs(found, record, job):
                     recorded=one["sha256"][:12],
                 ),
             )
-
-
-def _digest_of(path):
-    """SHA-256 of a file of any size."""
-    import hashlib
-
-    with open(path, "rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -100,6 +100,7 @@ def test_a_run_writes_everything(done, capsys):
         "field-table.pdf",
         "report.pdf",
         "report.html",
+        "SHA256SUMS",
     }
     assert not list(done.glob(".tankcal-*"))
 

@@ -12,7 +12,7 @@ ALL = [*TUTORIALS, *sorted((FOLDER / "studies").glob("*.ipynb"))]
 MOST_LINES = 150
 DOORS = (
     *("tankcal.report", "tankcal.report.planning", "tankcal.report.comparison"),
-    "tankcal.report.inspection",
+    *("tankcal.report.inspection", "tankcal.report.history", "tankcal.report.verification"),
 )
 
 

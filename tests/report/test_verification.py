@@ -1,12 +1,22 @@
 """`tankcal verify`: every disagreement between the files of a run is told, and nothing else."""
 
+import hashlib
 import json
+import os
 import shutil
+import subprocess
+from pathlib import Path
 
+import numpy as np
 import pytest
+from compared_tables import plain
+from job_builder import write_job, write_workbook
+from test_adjustment_outputs import write_station
 
+import tankcal
 from tankcal.cli import main
 from tankcal.errors import InputError
+from tankcal.report.comparison import write_comparison
 from tankcal.report.verification import verify
 
 pytestmark = pytest.mark.slow
@@ -19,6 +29,7 @@ def job(example_run, tmp_path):
 
 
 def told(path, **options):
+    options = {"hashes_only": True} | options
     return [(one.file, one.expected.code) for one in verify(path, **options).problems]
 
 
@@ -26,14 +37,19 @@ def test_a_run_agrees_with_itself(job, capsys):
     found = verify(job / "results")
     assert found.problems == []
     assert found.inputs_found
+    assert found.papers_again
+    assert found.notes == []
+    again = found.recomputed
+    assert (again.different, again.largest, again.agrees) == (0, None, True)
+    assert again.numbers > 100_000
     names = {"record.json", "certificate.pdf", "report.pdf", "field-table.pdf", "certificate.xml",
              "working-papers.pdf", "capacity.xlsx", "capacity.csv", "report.html", "report.ipynb",
              "job.toml", "points.csv"}  # fmt: skip
     assert names <= set(found.compared)
-    assert main(["verify", str(job / "results")]) == 0
+    assert main(["verify", str(job / "results"), "--hashes-only"]) == 0
     assert found.digest in capsys.readouterr().out
     for name in ("certificate.pdf", "report.pdf"):
-        assert verify(job / "results" / name).problems == []
+        assert verify(job / "results" / name, hashes_only=True).problems == []
 
 
 def test_a_changed_record_is_told_of_by_every_paper(job, capsys):
@@ -44,7 +60,7 @@ def test_a_changed_record_is_told_of_by_every_paper(job, capsys):
                  "capacity.xlsx", "certificate.xml", "report.html", "report.ipynb"):  # fmt: skip
         assert (name, "verify_other_record") in found
     assert ("certificate.pdf", "verify_differs_inside") in found
-    assert main(["verify", str(job / "results"), "--language", "pt-BR"]) == 2
+    assert main(["verify", str(job / "results"), "--language", "pt-BR", "--hashes-only"]) == 2
     assert "certificate.pdf: foi feito de outro registro" in capsys.readouterr().out
 
 
@@ -69,7 +85,7 @@ def test_a_changed_workbook_differs_from_that_inside(job):
     path = job / "results" / "capacity.xlsx"
     path.write_bytes(path.read_bytes() + b" ")
     inside = [(one, "verify_differs_inside") for one in ("certificate.pdf", "report.pdf")]
-    assert told(job / "results") == inside
+    assert told(job / "results") == [*inside, ("capacity.xlsx", "verify_altered")]
 
 
 def test_changed_and_missing_input_files_are_told_of(job):
@@ -80,13 +96,13 @@ def test_changed_and_missing_input_files_are_told_of(job):
         ("courses.csv", "verify_input_missing"),
     ]
     moved = shutil.move(job / "results", job.parent / "alone")
-    assert not verify(moved).inputs_found
+    assert not verify(moved, hashes_only=True).inputs_found
     assert told(moved, job=job)[0] == ("points.csv", "verify_input_changed")
 
 
 def test_a_paper_of_another_run_is_told_of(job, adjusted_record, tmp_path):
     assert main(["report", str(adjusted_record), "--out", str(tmp_path / "other"), "--quiet"]) == 0
-    assert verify(tmp_path / "other").problems == []
+    assert verify(tmp_path / "other", hashes_only=True).problems == []
     shutil.copyfile(tmp_path / "other" / "working-papers.pdf", job / "results" / "report.pdf")
     found = told(job / "results")
     assert ("report.pdf", "verify_other_record") in found
@@ -101,14 +117,11 @@ JUNK = {"empty": b"", "zeros": b"\0" * 5000, "words": b"no PDF", "head": b"%PDF-
                                   "report.html", "record.json"])  # fmt: skip
 def test_junk_is_told_of_in_a_line(job, capsys, name, content):
     (job / "results" / name).write_bytes(content)
-    status = main(["verify", str(job / "results")])
+    status = main(["verify", str(job / "results"), "--hashes-only"])
     said = capsys.readouterr()
     assert "Traceback" not in said.out + said.err
-    if name == "report.html":  # a page without a hash is nobody's paper
-        assert status == 0
-    else:
-        assert status == 2
-        assert f"{name}: " in said.out + said.err
+    assert status == 2
+    assert f"{name}: " in said.out + said.err
 
 
 @pytest.mark.parametrize("cut", [0.2, 0.5, 0.9, 0.999])
@@ -133,9 +146,255 @@ def test_there_must_be_something_to_compare(tmp_path, capsys):
 
 def test_one_json_object(job, capsys):
     (job / "points.csv").write_text("x", encoding="utf-8")
-    assert main(["verify", str(job / "results"), "--json"]) == 2
+    assert main(["verify", str(job / "results"), "--json", "--hashes-only"]) == 2
     found = json.loads(capsys.readouterr().out)
     assert found["exit_status"] == 2
     assert found["inputs_compared"]
     assert [one["code"] for one in found["problems"]] == ["verify_input_changed"]
     assert found["record_sha256"] in (job / "results" / "report.html").read_text(encoding="utf-8")
+    assert found["manifest_sha256"] == sha256_of(job / "results" / "SHA256SUMS")
+    assert found["recomputed"] is None
+
+
+def sha256_of(path):
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
+def write_sums_again(folder):
+    """A manifest that fits files that were altered, as who alters them can write it."""
+    kept = [row for row in (folder / "SHA256SUMS").read_text().splitlines() if row[0] == "#"]
+    names = sorted(one.name for one in folder.iterdir() if one.name != "SHA256SUMS")
+    rows = [f"{sha256_of(folder / name)}  {name}" for name in names]
+    (folder / "SHA256SUMS").write_text("\n".join([*kept, *rows, ""]), encoding="utf-8")
+
+
+HIDDEN = ("report.html", "report.ipynb", "working-papers.pdf", "field-table.pdf")
+
+
+def alter(path):
+    """Change what a reader sees, or the last bytes of a PDF, and no hash that it names."""
+    content = path.read_bytes()
+    at = content.rfind(b"13.0") if path.suffix != ".pdf" else content.rfind(b"endobj") - 8
+    path.write_bytes(content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :])
+
+
+@pytest.mark.parametrize("name", HIDDEN)
+def test_a_change_that_no_hash_inside_shows_is_told_of(job, name):
+    alter(job / "results" / name)
+    found = told(job / "results")
+    assert (name, "verify_altered") in found or (name, "verify_no_pdf") in found
+    assert {file for file, _ in found} == {name}
+
+
+def test_papers_made_again_see_what_an_altered_manifest_hides(job):
+    for name in ("report.html", "report.ipynb"):
+        alter(job / "results" / name)
+    write_sums_again(job / "results")
+    assert told(job / "results") == []
+    assert told(job / "results", hashes_only=False) == [
+        ("report.html", "verify_other_paper"),
+        ("report.ipynb", "verify_other_paper"),
+    ]
+
+
+def test_missing_and_extra_files_are_told_of(job):
+    (job / "results" / "working-papers.pdf").unlink()
+    (job / "results" / "notes.txt").write_text("x", encoding="utf-8")
+    assert told(job / "results") == [
+        ("working-papers.pdf", "verify_missing"),
+        ("notes.txt", "verify_extra"),
+    ]
+
+
+def test_papers_of_another_maker_are_held_against_the_manifest_only(job):
+    path = job / "results" / "SHA256SUMS"
+    path.write_text(path.read_text(encoding="utf-8").replace("typst ", "typst 0."), "utf-8")
+    found = verify(job / "results")
+    assert found.problems == []
+    assert not found.papers_again
+    assert [one.code for one in found.notes] == ["verify_other_maker"]
+    assert "typst 0.0" in str(found.notes[0])
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"abc  x\n", b"# made by tankcal\n"])
+def test_a_manifest_that_is_none_is_refused_in_a_line(job, content, capsys):
+    (job / "results" / "SHA256SUMS").write_bytes(content)
+    assert main(["verify", str(job / "results"), "--hashes-only"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("tankcal: SHA256SUMS")
+
+
+def test_a_folder_without_a_manifest_says_so(job):
+    (job / "results" / "SHA256SUMS").unlink()
+    found = verify(job / "results", hashes_only=True)
+    assert found.problems == []
+    assert [one.code for one in found.notes] == ["verify_no_manifest_here"]
+
+
+@pytest.mark.skipif(shutil.which("sha256sum") is None, reason="no sha256sum here")
+def test_coreutils_check_the_manifest(job):
+    """Other program: an archive is checked without tankcal, too."""
+    done = subprocess.run(["sha256sum", "-c", "--strict", "SHA256SUMS"], cwd=job / "results",
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count(": OK") == len(os.listdir(job / "results")) - 1
+
+
+def change_record(folder, change):
+    path = folder / "record.json"
+    record = json.loads(path.read_text(encoding="utf-8"))
+    change(record)
+    path.write_text(json.dumps(record), encoding="utf-8")
+
+
+def test_a_number_that_does_not_come_out_again_is_told_of(job):
+    """The forger made every paper again of a record with another volume."""
+    change_record(
+        job / "results", lambda one: one["capacity"]["volume_m3"].__setitem__(950, 1250.0)
+    )
+    out = job / "results"
+    assert main(["report", str(out), "--quiet"]) == 0
+    assert told(out) == []
+    found = verify(out)
+    assert [one.expected.code for one in found.problems] == ["verify_number_apart"]
+    assert found.recomputed.beyond[0].place == "capacity.volume_m3[950]"
+    assert found.recomputed.beyond[0].recorded == 1250.0
+
+
+def test_a_last_digit_of_another_machine_is_within_tolerance(job, capsys):
+    """A few parts in 10^12, as another processor may give."""
+
+    def nudge(record):
+        record["capacity"]["volume_m3"][950] *= 1 + 3e-12
+
+    change_record(job / "results", nudge)
+    assert main(["report", str(job / "results"), "--quiet"]) == 0
+    capsys.readouterr()
+    assert main(["verify", str(job / "results"), "--json"]) == 0
+    again = json.loads(capsys.readouterr().out)["recomputed"]
+    assert (again["different"], again["agrees"]) == (1, True)
+    assert again["largest"]["place"] == "capacity.volume_m3[950]"
+    assert again["largest"]["relative"] == pytest.approx(3e-12, rel=1e-3)
+
+
+def test_a_changed_input_is_not_computed_again(job):
+    (job / "points.csv").write_text("point,x_m,y_m,z_m\n", encoding="utf-8")
+    found = verify(job / "results")
+    assert [one.expected.code for one in found.problems] == ["verify_input_changed"]
+    assert found.recomputed is None
+    assert [one.code for one in found.notes] == ["verify_inputs_differ"]
+
+
+def test_a_file_that_came_into_the_job_later_is_not_read(job):
+    """Only the files that the record names count: a new uncertainty would change every U."""
+    (job / "deadwood.csv").write_text("name,bottom_m,top_m,volume_m3\na,0,1,1\n", "utf-8")
+    found = verify(job / "results")
+    assert (found.problems, found.recomputed.different) == ([], 0)
+
+
+def test_papers_in_another_language_come_out_again(job, tmp_path):
+    assert main(["report", str(job / "results"), "--language", "es", "--quiet",
+                 "--out", str(tmp_path / "es")]) == 0  # fmt: skip
+    found = verify(tmp_path / "es", job)
+    assert (found.problems, found.papers_again, found.recomputed.different) == ([], True, 0)
+
+
+def run_small(job, out, **options):
+    """A small job, record and tables only."""
+    return tankcal.write(tankcal.run(tankcal.load(job), **options), out, papers=False)
+
+
+def test_a_run_without_monte_carlo_comes_out_again(tmp_path):
+    """The record has none though its job asks for it: what was left out is left out again."""
+    job = write_job(tmp_path / "job", settings={"table.step_m": 0.1})
+    run_small(job, job / "results", simulated=False)
+    found = verify(job / "results")
+    assert (found.problems, found.recomputed.otherwise) == ([], ())
+
+
+def test_the_job_of_a_workbook_comes_out_again(tmp_path):
+    book = tmp_path / "tank.xlsx"
+    write_workbook(book, settings={"table.step_m": 0.1})
+    run_small(book, tmp_path / "tank-results")
+    for given in (None, tmp_path, book):
+        found = verify(tmp_path / "tank-results", given)
+        assert (found.problems, found.inputs_found) == ([], True)
+        assert found.recomputed.different == 0
+
+
+def test_a_record_that_names_files_elsewhere_writes_nothing_there(tmp_path):
+    """Names with .. are read where they are, never linked."""
+    job = write_job(tmp_path / "job", settings={"table.step_m": 0.1})
+    run_small(job, job / "results")
+
+    def elsewhere(record):
+        record["files"][0]["file"] = "../job/" + record["files"][0]["file"]
+
+    change_record(job / "results", elsewhere)
+    before = sorted(tmp_path.rglob("*"))
+    found = verify(job / "results")
+    assert sorted(tmp_path.rglob("*")) == before
+    codes = {one.expected.code for one in found.problems}
+    assert codes == {"verify_text_apart"}
+
+
+def test_a_job_that_this_version_refuses_is_told(tmp_path):
+    job = write_job(tmp_path / "job", settings={"table.step_m": 0.1})
+    run_small(job, job / "results")
+    text = (job / "job.toml").read_text(encoding="utf-8") + "\n[unheard]\nx = 1\n"
+    (job / "job.toml").write_text(text, encoding="utf-8")
+
+    def of_the_changed_file(record):
+        for one in record["files"]:
+            one["sha256"] = sha256_of(job / one["file"])
+
+    change_record(job / "results", of_the_changed_file)
+    found = verify(job / "results")
+    assert next(one.expected.code for one in found.problems) == "verify_not_computed"
+    assert "unheard" in str(found.problems[0])
+
+
+def test_papers_with_a_letterhead_come_out_again(job, tmp_path):
+    head = tmp_path / "lab.toml"
+    head.write_text('[laboratory]\nname = "Lab X"\naddress = ["A 1"]\n', encoding="utf-8")
+    out = tmp_path / "headed"
+    arguments = ("--letterhead", str(head), "--quiet", "--out", str(out))
+    assert main(["report", str(job / "results"), *arguments]) == 0
+    found = verify(out)
+    assert (found.problems, found.papers_again, found.inputs_found) == ([], True, False)
+    (out / "letterhead.json").write_text("{", encoding="utf-8")
+    assert next(one.file for one in verify(out).problems) == "letterhead.json"
+
+
+def test_an_adjusted_survey_alone_comes_out_again_with_its_covariance(tmp_path, job_station):
+    results = job_station / "results"
+    assert main(["run", str(job_station), "--only", "adjustment", "--no-papers", "--quiet"]) == 0
+    found = verify(results)
+    assert (found.problems, found.recomputed.different) == ([], 0)
+    assert "points_cov.npz" in found.compared
+    with np.load(results / "points_cov.npz") as held:
+        matrix, points = 1.1 * held["covariance_m2"], held["points"]
+    np.savez(results / "points_cov.npz", covariance_m2=matrix, points=points)
+    write_sums_again(results)
+    codes = [one.expected.code for one in verify(results).problems]
+    assert codes == ["verify_covariance_apart"]
+
+
+@pytest.fixture
+def job_station(tmp_path):
+    """A small survey by a total station."""
+    return write_station(tmp_path / "station")
+
+
+def test_other_folders_say_what_cannot_be_verified(tmp_path):
+    """A comparison: hashes and papers; its tables lie nobody knows where."""
+    out = tmp_path / "c"
+    write_comparison(plain(), out, "pt-BR")
+    found = verify(out)
+    assert (found.problems, found.papers_again) == ([], True)
+    assert [one.code for one in found.notes] == ["verify_not_from_inputs"]
+    (out / "comparison.html").write_bytes(b"x")
+    assert [one.file for one in verify(out).problems] == ["comparison.html"]
+    (out / "comparison.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError):
+        verify(out)

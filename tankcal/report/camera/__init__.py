@@ -11,7 +11,7 @@ from pathlib import Path
 from tankcal import report
 from tankcal.messages import message
 from tankcal.record.camera_versions import KINDS
-from tankcal.report import folders
+from tankcal.report import folders, manifest
 from tankcal.report.camera.paper import CameraPaper, made_from
 from tankcal.report.outputs.csv_files import write_rows
 from tankcal.report.terminal import lines_of
@@ -35,7 +35,7 @@ TABLES = (
     "axes.csv",
     "classes.csv",
 )
-FILES = (RECORD, *TABLES, "report.ipynb", "report.pdf", "report.html")
+FILES = (RECORD, *TABLES, "report.ipynb", "report.pdf", "report.html", manifest.FILE)
 
 
 def lines(result, language=None):
@@ -59,7 +59,7 @@ def write(result, directory, progress=None, language=None):
 
     kind = CameraPaper(result, language).result["kind"]
     progress = progress or (lambda text, done, total: None)
-    with folders.replaced(directory) as temporary:
+    with folders.replaced(directory, language) as temporary:
         text = json.dumps(result, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
         (temporary / RECORD).write_text(text + "\n", encoding="utf-8")
         for name, rows in _of_kind(result).tables(result).items():

@@ -8,7 +8,7 @@ from pathlib import Path
 from tankcal.messages import message
 from tankcal.record import save
 from tankcal.record.comparison import COMPARISON, plain_of_comparison
-from tankcal.report import folders
+from tankcal.report import folders, manifest
 from tankcal.report.comparison.paper import FILE, WORKBOOK, ComparisonPaper
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL
 from tankcal.report.saved_folder import SavedFolder
@@ -25,7 +25,7 @@ TABLES = {
     "deliveries.csv": DELIVERIES,
     "courses.csv": COURSES,
 }
-FILES = (FILE, *TABLES, WORKBOOK, PDF, PAGE)
+FILES = (FILE, *TABLES, WORKBOOK, PDF, PAGE, manifest.FILE)
 _FOLDER = SavedFolder(
     COMPARISON,
     FILES,
@@ -69,7 +69,7 @@ def write_comparison(found, folder, language=None, progress=None, letterhead=Non
     progress = progress or (lambda text: None)
     plain = found if isinstance(found, dict) else plain_of_comparison(found)
     paper = ComparisonPaper(plain, language, letterhead)
-    with folders.replaced(folder) as temporary:
+    with folders.replaced(folder, language) as temporary:
         _write(paper, temporary, progress)
     return [path for path in (Path(folder) / name for name in FILES) if path.exists()]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from tankcal.messages import message
 from tankcal.record import save
 from tankcal.record.inspection import INSPECTION, plain_of_inspection
-from tankcal.report import folders
+from tankcal.report import folders, manifest
 from tankcal.report.inspection.paper import FILE, WORKBOOK, InspectionPaper
 from tankcal.report.saved_folder import SavedFolder
 
@@ -19,7 +19,7 @@ __all__ = [
 ]
 
 PDF = "inspection.pdf"
-FILES = (FILE, WORKBOOK, PDF)
+FILES = (FILE, WORKBOOK, PDF, manifest.FILE)
 _FOLDER = SavedFolder(
     INSPECTION,
     FILES,
@@ -63,7 +63,7 @@ def write_inspection(found, out, language=None, progress=None, letterhead=None):
     progress = progress or (lambda text: None)
     plain = found if isinstance(found, dict) else plain_of_inspection(found)
     paper = InspectionPaper(plain, language, letterhead)
-    with folders.replaced(out) as temporary:
+    with folders.replaced(out, language) as temporary:
         _write(paper, temporary, progress)
     return [Path(out) / name for name in FILES]
 

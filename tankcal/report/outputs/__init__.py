@@ -12,7 +12,7 @@ from tankcal.errors import InputError, Problem, TankcalError, VocabularyError
 from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.messages import message
 from tankcal.record.plain_data import without_collection
-from tankcal.report import dcc, folders
+from tankcal.report import dcc, folders, manifest
 from tankcal.report.attachments import sha256
 from tankcal.report.outputs import tables
 from tankcal.text.languages import LANGUAGES
@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 
 RECORD = "record.json"
 WORKBOOKS = ("capacity.xlsx", "adjustment.xlsx")
-FILES = (RECORD, *tables.FILES, *WORKBOOKS, dcc.FILE, *report.FILES, report.LETTERHEAD)
+FILES = (
+    *(RECORD, *tables.FILES, *WORKBOOKS, dcc.FILE, *report.FILES, report.LETTERHEAD),
+    manifest.FILE,
+)
 
 
 def write(
@@ -149,7 +152,7 @@ def _write(prepare, directory, progress, language=None, letterhead=None, papers=
     """Write everything into `directory`; `prepare` puts the record into a folder and gives it."""
     refuse_foreign(directory)
     progress = progress or (lambda text, done, total: None)
-    with folders.replaced(directory) as temporary:
+    with folders.replaced(directory, language) as temporary:
         progress(message("writing_record", "writing the record and the tables"), 0, 1)
         with without_collection():
             record = prepare(temporary)

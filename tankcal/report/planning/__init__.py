@@ -6,7 +6,7 @@ Nothing here computes a number.
 from pathlib import Path
 
 from tankcal.messages import message
-from tankcal.report import folders
+from tankcal.report import folders, manifest
 from tankcal.report.planning.paper import PlanPaper
 
 __all__ = ["DESIGN", "FILES", "JOB", "PlanPaper", "refuse_foreign", "write"]
@@ -18,6 +18,7 @@ WRITING_TABLES = message("plan_writing_tables", "writing the tables")
 FILES = (
     *("plan.json", "points.csv", "sections.csv", "capacity.csv", "changes.csv", "design.csv"),
     *("changes.png", "prediction.pdf", "field-sheets.pdf", "field-sheets.xlsx"),
+    manifest.FILE,
 )
 
 
@@ -38,7 +39,7 @@ def write(
     """
     refuse_foreign(directory)
     progress = progress or (lambda text: None)
-    with folders.replaced(directory) as temporary:
+    with folders.replaced(directory, language) as temporary:
         kind = _paper_of(prediction)
         paper = kind(prediction, language, effects, design, simulated)
         _write(paper, temporary, progress)

@@ -1,0 +1,183 @@
+"""`tankcal history`: the tables of one tank over the years."""
+
+from pathlib import Path
+
+from tankcal.cli.arguments import add_language, parse_dips
+from tankcal.cli.machine import add_json, print_json
+from tankcal.cli.showing import (
+    Progress,
+    language_of_run,
+    marks,
+    prepare_for_small_work,
+    print_paths,
+    say,
+    speak_of_record,
+    warn,
+)
+from tankcal.messages import message
+from tankcal.text.digits import NOTHING, decimals_of_height, fixed
+
+MOST_SHOWN = 20  # warnings, and files that are left out
+
+
+def add(commands):
+    """The parser of `tankcal history`."""
+    history = commands.add_parser(
+        "history",
+        help="the tables of one tank over the years",
+        description="Search folders for the results of a tank (record.json, inspection.json), "
+        "bring its tables to one basis, and show certificates, volumes, radii and verdicts over "
+        "the years, each with U; what changed from one table to the next is what tankcal compare "
+        "says of them. docs/history.md says how.",
+        epilog="exit status: 0 done; 2 the input must be mended (one line for each file that "
+        "cannot be read).",
+    )
+    history.add_argument(
+        "sources",
+        metavar="TANK",
+        nargs="+",
+        help="folders, in and below which results are looked for; files record.json or "
+        "inspection.json; former tables, by a former.toml with their date",
+    )
+    history.add_argument(
+        "--tank",
+        metavar="ID",
+        action="append",
+        default=[],
+        help="id of the tank, in folders of several; several times where it has had several",
+    )
+    history.add_argument(
+        "--at",
+        metavar="DIPS",
+        type=parse_dips,
+        help="dips that volumes are shown at, m, separated by commas (default: fifths of the "
+        "range that all tables have)",
+    )
+    history.add_argument(
+        "--courses",
+        metavar="FILE",
+        help="courses.csv of an upright tank, where no record has its courses",
+    )
+    history.add_argument(
+        "--out", metavar="DIR", help="write history.json and papers there, all or nothing"
+    )
+    add_language(history)
+    history.add_argument("--quiet", action="store_true", help="no progress, only problems")
+    add_json(history)
+    history.set_defaults(command=_history)
+
+
+def _history(options):
+    prepare_for_small_work()
+    speak_of_record(options.language, *options.sources)
+    from tankcal.recalibration.history_inputs import history_of_files
+    from tankcal.record.history import plain_of_history
+
+    if options.out is not None:
+        from tankcal.report.history import refuse_foreign, write_history
+
+        refuse_foreign(options.out)
+    show = Progress(options.quiet or options.machine)
+    found = plain_of_history(
+        history_of_files(
+            options.sources,
+            tanks=options.tank,
+            dips_m=options.at,
+            courses=options.courses,
+            progress=show.part,
+        )
+    )
+    written = ()
+    if options.out is not None:
+        written = write_history(found, options.out, language_of_run(), show.step)
+    show.end()
+    if options.machine:
+        print_json(exit_status=0, **found)
+        return
+    _tell(found)
+    if written:
+        print_paths(Path(options.out), [path.name for path in written])
+
+
+def _tell(found):
+    """Warnings, then a line for each certificate, change and inspection."""
+    from tankcal.report.history import HistoryPaper
+
+    paper = HistoryPaper(found, language_of_run())
+    warn(paper.warning(one) for one in found["warnings"][:MOST_SHOWN])
+    for one in found["left_out"][:MOST_SHOWN]:
+        say(message("history_left_out", "not in the history: {text}", text=paper.warning(one)))
+    say(_span(found))
+    for one in found["certificates"]:
+        say(_certificate(one))
+    for one in found["changes"]:
+        say(_change(one, paper))
+    for one in found["inspections"]:
+        say(_inspection(one))
+
+
+def _span(found):
+    certificates = found["certificates"]
+    tank = found["tank"] or certificates[-1]["file"]
+    if len(certificates) == 1:
+        return message(
+            "history_one", "{tank}: 1 certificate, {date}", tank=tank, date=certificates[0]["date"]
+        )
+    return message(
+        "history_span",
+        "{tank}: {count} certificates, {first} to {last}",
+        tank=tank,
+        count=len(certificates),
+        first=certificates[0]["date"],
+        last=certificates[-1]["date"],
+    )
+
+
+def _certificate(one):
+    U = ""
+    if one["U_top_m3"] is not None:
+        U = message("history_U", ", U = {uncertainty} m3", uncertainty=_volume(one["U_top_m3"]))
+    return message(
+        "history_row",
+        "  {number}  {date}  {volume} m3 at {dip} m{uncertainty}  {name}",
+        number=one["certificate"],
+        date=one["date"],
+        volume=_volume(one["top_volume_m3"]),
+        dip=_dip(one["top_dip_m"]),
+        uncertainty=U,
+        name=one["number"] or one["file"],
+    )
+
+
+def _change(one, paper):
+    E_n, d = one["worst_E_n"], one["top_d_m3"]
+    return message(
+        "history_change",
+        "  {former} to {new}: {d} m3 at {dip} m, worst E_n {E_n}, {verdict}",
+        former=one["former"],
+        new=one["new"],
+        d=("+" if d > 0 else "") + _volume(d),
+        dip=_dip(one["high_m"]),
+        E_n=NOTHING if E_n is None else fixed(E_n, 2, marks()),
+        verdict=paper.words["verdicts"].get(one["verdict"] or "", NOTHING),
+    )
+
+
+def _inspection(one):
+    passed = sum(check["verdict"] == "passed" for check in one["checks"])
+    return message(
+        "history_inspected",
+        "  inspection of {date}: {passed} of {count} checks passed  {name}",
+        date=one["date"] or NOTHING,
+        passed=passed,
+        count=len(one["checks"]),
+        name=one["file"],
+    )
+
+
+def _volume(value):
+    return fixed(value, 3, marks())
+
+
+def _dip(value):
+    return fixed(value, decimals_of_height(value), marks())

@@ -1,0 +1,301 @@
+"""The tables of one tank over the years: volumes and radii on one basis, what changed when.
+
+Every table is compared with the newest one (`recalibration.comparison.compare`), which brings it
+to that basis; and each with the one before it, which says what changed between them. Nothing is
+computed here that a comparison does not say.
+"""
+
+from dataclasses import dataclass
+from datetime import date
+from itertools import pairwise
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+from tankcal.recalibration.agreement import coverage_factor_of, normalized_error
+from tankcal.recalibration.comparison import PARTS_OF_HEIGHT, compare
+from tankcal.recalibration.former import FormerTable
+from tankcal.recalibration.history_checks import warnings_of_tables
+from tankcal.record.history import (
+    CertificateInHistory,
+    HistoryFile,
+    RadiusChange,
+    RadiusInHistory,
+    TableChange,
+    VolumeInHistory,
+)
+from tankcal.record.texts import warnings_of
+
+DAYS_OF_YEAR = 365.25
+MOST_WARNINGS = 100
+
+
+@dataclass(frozen=True)
+class DatedTable:
+    """A capacity table of a tank, with its day.
+
+    Attributes
+    ----------
+    table : FormerTable
+        Its name is where it was found.
+    sha256 : str
+        Of its file.
+    day : date
+    """
+
+    table: FormerTable
+    sha256: str
+    day: date
+
+    @property
+    def tank(self):
+        """Id of the tank in the record; None where there is none."""
+        record = self.table.record
+        return None if record is None else record["job"]["tank"].get("id")
+
+
+def history_of(
+    tables, inspections=(), *, dips_m=None, courses=None, left_out=(), warnings=(), progress=None
+):
+    """The history of a tank.
+
+    Parameters
+    ----------
+    tables : sequence of DatedTable
+        In any order, at least one.
+    inspections : sequence of InspectionInHistory
+    dips_m : sequence of float, optional
+        That volumes are shown at; None: at fifths of the range that all tables have.
+    courses : (heights, thicknesses), optional
+        Of an upright tank, m, where no record has them.
+    left_out, warnings : sequence of Problem
+        Of finding and reading the files.
+    progress : callable, optional
+        progress(text, done, total)
+
+    Returns
+    -------
+    record.history.HistoryFile
+
+    Raises
+    ------
+    InputError
+        With every pair of tables that cannot be of one tank, and every dip that no table has.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> dips = np.linspace(0.0, 8.0, 81)
+    >>> def table(year, area):
+    ...     rows = FormerTable(f"{year}.csv", dips, area * dips, U_m3=0.2 * dips)
+    ...     return DatedTable(rows, "", date(year, 5, 1))
+    >>> found = history_of([table(2020, 100.05), table(2010, 100.0)])
+    >>> [one.date for one in found.certificates], round(found.changes[0].top_d_m3, 3)
+    (['2010-05-01', '2020-05-01'], 0.4)
+    """
+    ordered = sorted(tables, key=_order)
+    progress = progress or (lambda text, done, total: None)
+    on_newest, successive = _comparisons(ordered, courses, progress)
+    k = coverage_factor_of(_with_u(ordered))
+    rows = _shown_rows(on_newest, dips_m)
+    newest = ordered[-1].table
+    told = [*warnings, *warnings_of_tables(ordered)]
+    return HistoryFile(
+        notice=_notice(newest),
+        tank=next((one.tank for one in reversed(ordered) if one.tank), None),
+        kind=newest.kind or ordered[0].table.kind,
+        coverage_k=k,
+        certificates=_certificates(ordered),
+        dips_m=rows,
+        volumes=[
+            volume
+            for number, one in enumerate(on_newest, 1)
+            for volume in _volumes(number, one, rows)
+        ],
+        radii=[
+            radius for number, one in enumerate(on_newest, 1) for radius in _radii(number, one, k)
+        ],
+        changes=[
+            _change(number, one, ordered[number - 1 : number + 1], k)
+            for number, one in enumerate(successive, 1)
+        ],
+        inspections=sorted(inspections, key=lambda one: (one.date is None, one.date, one.file)),
+        left_out=warnings_of(left_out),
+        warnings=_warnings(told, successive),
+    )
+
+
+def _order(one):
+    """By day; of one day by number, program and file: the order is the same on every machine."""
+    record = one.table.record or {}
+    return one.day, str(one.table.number or ""), record.get("tankcal") or "", one.table.name
+
+
+def _with_u(ordered):
+    """The newest table with U, else the newest one."""
+    known = [one.table for one in ordered if one.table.U_m3 is not None]
+    return known[-1] if known else ordered[-1].table
+
+
+def _comparisons(ordered, courses, progress):
+    """(each with the newest, each with the one before): lists of ComparisonFile."""
+    newest, problems, found = ordered[-1].table, {}, ([], [])
+    pairs = [(0, one.table, newest) for one in ordered]
+    pairs += [(1, a.table, b.table) for a, b in pairwise(ordered)]
+    for done, (which, former, new) in enumerate(pairs):
+        text = message("history_comparing", "comparing {count} tables", count=len(ordered))
+        progress(text, done, len(pairs))
+        try:
+            found[which].append(compare(former, new, courses=courses))
+        except InputError as error:
+            problems |= dict.fromkeys(error.problems)
+    if problems:
+        raise InputError(list(problems))
+    return found
+
+
+def _warnings(told, comparisons):
+    """Problems, then what the comparisons warn of, each once; WarningRecords."""
+    found = warnings_of(told)
+    for one in comparisons:
+        found += [warning for warning in one.warnings if warning.code != "compare_dates_turned"]
+    return list({(one.file, one.text): one for one in found}.values())[:MOST_WARNINGS]
+
+
+def _notice(table):
+    certificate = (table.record or {}).get("job", {}).get("certificate") or {}
+    return str(certificate.get("notice") or "")
+
+
+# ---- what is saved
+
+
+def _certificates(ordered):
+    days = [one.day.isoformat() for one in ordered]
+    found = []
+    for number, (one, after) in enumerate(zip(ordered, [*days[1:], None], strict=True), 1):
+        table, record = one.table, one.table.record
+        tank = {} if record is None else record["job"]["tank"]
+        rule = None if record is None else record.get("rule")
+        fit = None if record is None else record.get("adjustment")
+        found.append(
+            CertificateInHistory(
+                certificate=number,
+                file=table.name,
+                sha256=one.sha256,
+                origin="table" if record is None else "record",
+                tank=one.tank,
+                date=one.day.isoformat(),
+                superseded=after,
+                number=table.number,
+                laboratory=table.laboratory,
+                method=table.method,
+                tankcal=None if record is None else record["tankcal"],
+                nominal_diameter_m=tank.get("nominal_diameter_m"),
+                nominal_height_m=tank.get("nominal_height_m"),
+                reference_temperature_c=table.reference_temperature_c,
+                liquid_density_kg_m3=table.liquid_density_kg_m3,
+                reference_height_m=table.reference_height_m,
+                zero=None if record is None else record["capacity"].get("zero"),
+                top_dip_m=float(table.height_m[-1]),
+                top_volume_m3=float(table.volume_m3[-1]),
+                U_top_m3=None if table.U_m3 is None else float(table.U_m3[-1]),
+                k=None if table.U_m3 is None else table.k,
+                rule=rule and rule["rule"]["name"],
+                rule_verdict=rule and rule["code"],
+                sigma0=fit and fit["sigma0"],
+                global_test_passed=fit and fit["passed"] if fit and fit["redundancy"] else None,
+            )
+        )
+    return found
+
+
+def _shown_rows(on_newest, dips_m):
+    """Dips of the newest table, for use in all comparisons, that volumes are shown at."""
+    common = None
+    for one in on_newest:
+        use = set(np.asarray(one.rows.height_m)[np.asarray(one.rows.for_use)].tolist())
+        common = use if common is None else common & use
+    dips = np.array(sorted(common))
+    if not len(dips):
+        expected = message("history_no_range", "no dip that every table has; expected one")
+        raise InputError(Problem(on_newest[-1].new.name, expected))
+    if dips_m is None:
+        asked = [dips[0] + part * (dips[-1] - dips[0]) for part in PARTS_OF_HEIGHT]
+    else:
+        asked = list(dips_m)
+        outside = [one for one in asked if not dips[0] - 1e-9 <= one <= dips[-1] + 1e-9]
+        if outside:
+            raise InputError([
+                Problem(
+                    "--at",
+                    message(
+                        "history_dip_outside",
+                        "found {dip:g} m; expected {low:g} to {high:g} m, which every table has",
+                        dip=one, low=float(dips[0]), high=float(dips[-1]),
+                    ),
+                )
+                for one in outside
+            ])  # fmt: skip
+    nearest = dict.fromkeys(float(dips[np.argmin(np.abs(dips - one))]) for one in asked)
+    return sorted(nearest)
+
+
+def _volumes(number, comparison, rows_m):
+    rows = comparison.rows
+    places = {float(dip): place for place, dip in enumerate(rows.height_m)}
+    c = comparison.correlation.c or 0.0
+    for dip in rows_m:
+        at = places[dip]
+        d = 0.0 - float(rows.d_m3[at])
+        U, of_newest = _known(rows.U_former_m3[at]), _known(rows.U_new_m3[at])
+        E_n = None if None in (U, of_newest) else float(normalized_error(d, U, of_newest, c))
+        yield VolumeInHistory(number, dip, float(rows.former_on_basis_m3[at]), U, d, E_n)
+
+
+def _known(value):
+    return None if np.isnan(value) else float(value)
+
+
+def _radii(number, comparison, k):
+    for one in comparison.courses:
+        U = None if one.u_former_m is None else float(k * one.u_former_m)
+        yield RadiusInHistory(number, one.course, one.bottom_m, one.top_m, one.former_m, U)
+
+
+def _change(number, comparison, pair, k):
+    rows, worst = comparison.rows, comparison.correlation
+    c = worst.c or 0.0
+    U = [_known(of[-1]) for of in (rows.U_former_m3, rows.U_new_m3)]
+    U_top = None if None in U else float(np.sqrt(U[0] ** 2 + U[1] ** 2 - 2 * c * U[0] * U[1]))
+    if U_top is not None and worst.coverage_k is not None:
+        U_top *= k / worst.coverage_k
+    former, new = pair
+    return TableChange(
+        former=number,
+        new=number + 1,
+        years=(new.day - former.day).days / DAYS_OF_YEAR,
+        low_m=comparison.low_m,
+        high_m=comparison.high_m,
+        top_d_m3=float(rows.d_m3[-1]),
+        U_top_m3=U_top,
+        worst_E_n=worst.worst_E_n,
+        c=worst.c,
+        zero_m=comparison.zero.height_m,
+        zero_source=comparison.zero.source,
+        not_made=[
+            one.code for one in comparison.steps if one.state in ("not_declared", "not_possible")
+        ],
+        verdict=comparison.verdict,
+        rule=comparison.rule.name,
+        radii=[
+            RadiusChange(
+                one.course,
+                one.d_m,
+                None if one.u_m is None else float(k * one.u_m),
+                None if one.w is None else one.w / k,
+            )
+            for one in comparison.courses
+        ],
+    )

@@ -1,0 +1,346 @@
+"""What `tankcal history` is given: folders that hold results, saved files, former tables."""
+
+import hashlib
+import json
+import os
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from datetime import date
+from pathlib import Path
+
+from tankcal import record as records
+from tankcal.errors import InputError, Problem
+from tankcal.job.tables import Log
+from tankcal.messages import list_some, message
+from tankcal.recalibration.history import DatedTable, history_of
+from tankcal.recalibration.inputs import read_shell, rows_file
+from tankcal.recalibration.reading import read_former
+from tankcal.record.history import CheckInHistory, InspectionInHistory
+from tankcal.record.inspection import INSPECTION
+
+RECORD = "record.json"
+MOST_NAMED = 10  # tanks, in a message
+TABLES = (".csv", ".xlsx", ".pdf", ".toml")
+
+
+@dataclass
+class Found:
+    """What lies in an archive.
+
+    Attributes
+    ----------
+    tables : list of DatedTable
+    inspections : list of InspectionInHistory
+    left_out : list of Problem
+        Files that no history can show, and why.
+    warnings : list of Problem
+    problems : list of Problem
+        Of files that cannot be read.
+    ids : dict
+        {id of a tank: how many files are of it}.
+    """
+
+    tables: list = field(default_factory=list)
+    inspections: list = field(default_factory=list)
+    left_out: list = field(default_factory=list)
+    warnings: list = field(default_factory=list)
+    problems: list = field(default_factory=list)
+    ids: dict = field(default_factory=dict)
+
+
+def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=None):
+    """The history of the tank whose results lie in folders.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        Folders, searched below for record.json and inspection.json; such files themselves; former
+        tables in any form that `read_former` reads, a former.toml with their date.
+    tanks : sequence of str
+        Ids of the tank; files of others are passed over. None: all files must be of one tank.
+    courses : path, optional
+        courses.csv of an upright tank, where no record has its courses.
+    dips_m, progress : optional
+        As of `history_of`.
+
+    Returns
+    -------
+    record.history.HistoryFile
+
+    Raises
+    ------
+    InputError
+        With every file that cannot be read, for several tanks where none was asked for, and for
+        tables that cannot be of one tank.
+    """
+    found = Found()
+    files = find_files(paths, progress)
+    seen = {}
+    for done, (path, name, is_sought) in enumerate(files):
+        if progress is not None:
+            progress(message("history_reading", "reading the files"), done, len(files))
+        try:
+            _read(found, path, name, tanks, seen, is_sought)
+        except InputError as error:
+            found.problems += [
+                replace(one, file=name) if one.file in (path.name, RECORD) else one
+                for one in error.problems
+            ]
+    log = Log()
+    shell = None if courses is None else read_shell(Path(courses), log)
+    found.problems += log.problems
+    if found.problems:
+        raise InputError(found.problems)
+    _refuse_several(found, tanks, paths)
+    if not found.tables:
+        raise InputError(_nothing(found, tanks, paths))
+    return history_of(
+        found.tables,
+        found.inspections,
+        dips_m=dips_m,
+        courses=shell,
+        left_out=found.left_out,
+        warnings=found.warnings,
+        progress=progress,
+    )
+
+
+def find_files(paths, progress=None):
+    """[(path, name as it is shown, whether it was found in a folder)] of all that may count.
+
+    Folders are walked without following links to other folders, so that no loop is endless; hidden
+    folders are passed over.
+    """
+    found, problems = [], []
+    for given in map(Path, paths):
+        if given.is_dir():
+            if progress is not None:
+                text = message("history_searching", "searching {folder}", folder=str(given))
+                progress(text, 0, 0)
+            for path in _below(given, problems):
+                found.append((path, len(path.relative_to(given).parts)))
+        elif given.is_file():
+            found.append((given, 0))
+        else:
+            text = message(
+                "history_nothing_there",
+                "is not there; expected a folder with results, a record.json, an inspection.json "
+                "or a former table",
+            )
+            problems.append(Problem(given.name or str(given), text))
+    if problems:
+        raise InputError(problems)
+    return _named(found)
+
+
+def _named(found):
+    """(path, name, whether it was found in a folder): by as many folders as tell files apart.
+
+    found  (path, least number of parts of the name; 0: it was not found in a folder) of each
+    """
+    places = {Path(os.path.abspath(path)).parts: least for path, least in reversed(found)}
+    tails, named = {}, []
+    for parts, least in reversed(places.items()):
+        count = max(least, 1)
+        while _count_tails(places, count, tails)[parts[-count:]] > 1:
+            count += 1
+        named.append((Path(*parts), "/".join(parts[-count:]), least > 0))
+    return named
+
+
+def _count_tails(places, count, known):
+    """How many places end in the same so many parts; `known` keeps what was counted."""
+    if count not in known:
+        known[count] = Counter(parts[-count:] for parts in places)
+    return known[count]
+
+
+def _below(folder, problems):
+    """Paths of the files below a folder that may count; folders that cannot be read are told."""
+
+    def tell(error):
+        text = message(
+            "history_folder_unreadable",
+            "a folder that cannot be read ({why}); expected one that can, or it left out",
+            why=error.strerror,
+        )
+        problems.append(Problem(str(error.filename), text))
+
+    for place, folders, files in os.walk(folder, onerror=tell):
+        folders[:] = sorted(one for one in folders if not one.startswith("."))
+        for name in (RECORD, INSPECTION.file):
+            if name in files and Path(place, name).is_file():  # no pipe, no broken link
+                yield Path(place, name)
+
+
+def _read(found, path, name, tanks, seen, is_sought):
+    """Put one file where it belongs."""
+    if path.suffix.lower() in TABLES:
+        _take_former(found, path, name, seen)
+        return
+    content = path.read_bytes()
+    if is_sought and tanks and not any(_may_name(content, one) for one in tanks):
+        if content.rstrip()[-1:] != b"}":
+            text = message("history_cut_off", "is cut off: of which tank it was is not known")
+            found.left_out.append(Problem(name, text))
+        return
+    saved = _parsed(content, path)
+    kind = str(saved.get("format") or "") if isinstance(saved, dict) else ""
+    if is_sought and not kind.startswith("tankcal-"):
+        text = message("history_not_ours", "no file of tankcal: passed over")
+        found.left_out.append(Problem(name, text))
+        return
+    digest = hashlib.sha256(content).hexdigest()
+    if kind.startswith(f"{INSPECTION.name}/"):
+        _take_inspection(found, INSPECTION.migrated(saved, path.name), name, digest, tanks, seen)
+    else:
+        _take_record(found, path, name, digest, tanks, seen)
+
+
+def _may_name(content, tank):
+    """Whether bytes hold the id of a tank as JSON writes it: quick, for archives of many tanks."""
+    return any(
+        json.dumps(tank, ensure_ascii=one).encode("utf-8", "replace") in content
+        for one in (False, True)
+    )
+
+
+def _parsed(content, path):
+    try:
+        return json.loads(content)
+    except (ValueError, RecursionError) as error:
+        text = message("history_no_json", "cannot be read: {error}", error=str(error))
+        raise InputError(Problem(path.name, text)) from None
+
+
+def _is_again(found, name, digest, seen):
+    """Whether the same file was read before; then a warning says so."""
+    if digest not in seen:
+        seen[digest] = name
+        return False
+    text = message(
+        "history_same_file", "is the same file as {other}: it counts once", other=seen[digest]
+    )
+    found.left_out.append(Problem(name, text))
+    return True
+
+
+def _take_record(found, path, name, digest, tanks, seen):
+    record = records.load(path)
+    tank = ((record["job"] or {}).get("tank") or {}).get("id")
+    if tanks and tank not in tanks:
+        return
+    if _is_again(found, name, digest, seen):
+        return
+    if tank is not None:
+        found.ids[tank] = found.ids.get(tank, 0) + 1
+    if record["capacity"] is None:
+        text = message("history_only_survey", "a survey that was only adjusted: it has no table")
+        found.left_out.append(Problem(name, text))
+        return
+    _add_table(found, replace(read_former(path), name=name), digest)
+
+
+def _take_former(found, path, name, seen):
+    table = replace(read_former(path), name=name)
+    digest = hashlib.sha256(rows_file(path).read_bytes()).hexdigest()
+    if not _is_again(found, name, digest, seen):
+        _add_table(found, table, digest)
+
+
+def _add_table(found, table, digest):
+    found.warnings += table.warnings if table.record is None else ()
+    day = _day(table.date)
+    if day is None:
+        text = message(
+            "history_no_date",
+            "without the date of its calibration: it has no place among the others",
+        )
+        found.left_out.append(Problem(table.name, text))
+        return
+    found.tables.append(DatedTable(table, digest, day))
+
+
+def _day(text):
+    try:
+        return date.fromisoformat(str(text or "")[:10])
+    except ValueError:
+        return None
+
+
+def _take_inspection(found, saved, name, digest, tanks, seen):
+    tank = saved["tank"]
+    if tanks and tank["id"] not in tanks:
+        return
+    if _is_again(found, name, digest, seen):
+        return
+    found.ids[tank["id"]] = found.ids.get(tank["id"], 0) + 1
+    day = _day(tank["survey_date"])
+    found.inspections.append(
+        InspectionInHistory(
+            file=name,
+            sha256=digest,
+            tank=tank["id"],
+            date=day and day.isoformat(),
+            rule=saved["rule"] and saved["rule"]["name"],
+            checks=_worst_checks(saved["checks"]),
+        )
+    )
+
+
+def _worst_checks(checks):
+    """The worst figure of each check: by its verdict, then by value over limit."""
+    worst = {}
+    for one in checks:
+        known = worst.get(one["code"])
+        if known is None or _gravity(one) > _gravity(known):
+            worst[one["code"]] = one
+    return [
+        CheckInHistory(
+            code=one["code"],
+            unit=one["unit"],
+            value=one["value"],
+            U=one["U"],
+            limit=one["limit"] and one["limit"]["value"],
+            verdict=one["verdict"],
+        )
+        for one in worst.values()
+    ]
+
+
+def _gravity(check):
+    order = ("not_determined", "passed", "guard_band", "failed")
+    value = abs(check["value"] or 0.0)
+    limit = check["limit"] and check["limit"]["value"]
+    return order.index(check["verdict"]), value / limit if limit else value
+
+
+def _refuse_several(found, tanks, paths):
+    if tanks or len(found.ids) < 2:
+        return
+    ids = sorted(found.ids)
+    text = message(
+        "history_several_tanks",
+        "files of {count} tanks: {ids}; expected those of one: --tank ID, several times where one "
+        "tank has had several",
+        count=len(ids),
+        ids=list_some(ids, MOST_NAMED),
+    )
+    raise InputError(Problem(Path(paths[0]).name or str(paths[0]), text))
+
+
+def _nothing(found, tanks, paths):
+    """Why there is no table, with what was found in place of one."""
+    name = Path(paths[0]).name or str(paths[0])
+    text = message(
+        "history_no_table",
+        "no capacity table with a date; expected record.json of tankcal in or below it",
+    )
+    if tanks:
+        text = message(
+            "history_no_table_of_tank",
+            "no capacity table with a date of tank {tank}; expected record.json of tankcal with "
+            "that id in or below it",
+            tank=", ".join(tanks),
+        )
+    return [Problem(name, text), *found.left_out]

@@ -1,0 +1,268 @@
+"""A record held against the same job computed again: do the same numbers come out?
+
+Every number is held against the one in its place. What is allowed between two machines is a part
+of the largest number of the same key (of all rows of a list): 1e-9 in the capacity table, 1e-6
+elsewhere, where a number may be the small difference of large ones (residuals, correlations).
+"""
+
+import os
+import shutil
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from tankcal.record.making import record_of, record_of_adjustment
+
+TABLE, TABLE_TOLERANCE, TOLERANCE = "capacity.", 1e-9, 1e-6
+UNCOMPARED = ("format", "tankcal", "versions", "job.source")  # who computed, and where
+WORDS = ("text", "words", "formula")  # of messages: a later version may say it otherwise
+
+
+@dataclass(frozen=True)
+class NumberApart:
+    """A number that came out otherwise.
+
+    Attributes
+    ----------
+    place : str
+        Where it stands: "capacity.volume_m3[130]".
+    recorded, computed : float
+    relative : float
+        Their difference over the largest number of that key; inf where that is 0.
+    tolerance : float
+        What is allowed of it.
+    """
+
+    place: str
+    recorded: float
+    computed: float
+    relative: float
+    tolerance: float
+
+
+@dataclass(frozen=True)
+class Recomputation:
+    """What came out again.
+
+    Attributes
+    ----------
+    made_by, computed_by : dict
+        {"tankcal", "python", "numpy", "scipy": version} of the record, and of now.
+    numbers : int
+        That were compared.
+    different : int
+        Of them, those that are not the same bit for bit.
+    largest : NumberApart or None
+        The largest relative difference over its tolerance; None: all are the same.
+    beyond : tuple of NumberApart
+        The largest of each key that is beyond its tolerance.
+    otherwise : tuple of (str, str, str)
+        Place, recorded and computed, of what is no number, or is not there in one of both.
+    """
+
+    made_by: dict
+    computed_by: dict
+    numbers: int
+    different: int
+    largest: NumberApart | None
+    beyond: tuple
+    otherwise: tuple
+
+    @property
+    def agrees(self):
+        """Whether every number is within its tolerance, and all else the same."""
+        return not self.beyond and not self.otherwise
+
+
+def compute_again(record, job, step=None, part=None, cluster="auto"):
+    """Compute the job of a record again and compare.
+
+    Parameters
+    ----------
+    record : dict
+        As `tankcal.record.load` gives it.
+    job : path
+        Folder of its input files: only those that the record names are read.
+    step : callable, optional
+        Called with a line of text as each step begins.
+    part : callable, optional
+        Called as part(text, done, total) within a long step.
+    cluster : str or int, optional
+        Who reads point clouds, as of `tankcal run`.
+
+    Returns
+    -------
+    Recomputation, survey.Adjustment or None
+        The latter of a survey that was adjusted.
+
+    Raises
+    ------
+    TankcalError
+        When this version refuses the job, or finds no sound solution of it.
+    """
+    from tankcal.job import load
+    from tankcal.pipeline.chain import adjust_job, run
+
+    with tempfile.TemporaryDirectory(prefix="tankcal-") as folder:
+        place = _job_of(record, Path(job), Path(folder))
+        if record["capacity"] is None:
+            read = load(place, only="adjustment")
+            adjustment = adjust_job(read, step)
+            found = record_of_adjustment(read, adjustment)
+        else:
+            simulated = None if record["monte_carlo"] else False  # it may have been left out
+            options = {"part_progress": part, "simulated": simulated, "cluster": cluster}
+            result = run(load(place), step, **options)
+            found, adjustment = record_of(result), result.adjustment
+    return compare_records(record, found), adjustment
+
+
+def _job_of(record, folder, temporary):
+    """Path of a job of the record's input files alone, links to those in `folder`.
+
+    A job whose files lie elsewhere (clouds) is read where it is.
+    """
+    names = [one["file"] for one in record["files"]]
+    paths = [PurePosixPath(name) for name in names]
+    if any(path.is_absolute() or ".." in path.parts for path in paths):
+        return folder
+    for name in names:
+        place, source = temporary / name, (folder / name).resolve()
+        place.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            os.symlink(source, place)
+        except OSError:  # where a system allows no links
+            shutil.copyfile(source, place)
+    books = [name for name in names if name.lower().endswith(".xlsx")]
+    return temporary if "job.toml" in names or not books else temporary / books[0]
+
+
+def input_folder(folder):
+    """The folder of a job's input files that a path names: itself, or where a workbook lies."""
+    folder = Path(folder)
+    return folder.parent if folder.is_file() else folder
+
+
+def compare_records(record, found):
+    """Hold one record against another, number by number.
+
+    Parameters
+    ----------
+    record, found : dict
+        As recorded, and as computed now, of one version of the format.
+
+    Returns
+    -------
+    Recomputation
+
+    Examples
+    --------
+    >>> versions = {"python": "3.12", "numpy": "2.1", "scipy": "1.14"}
+    >>> one = {"tankcal": "0.1.0", "versions": versions, "capacity": {"volume_m3": [0.0, 500.0]}}
+    >>> other = one | {"capacity": {"volume_m3": [0.0, 500.0000001]}}
+    >>> found = compare_records(one, other)
+    >>> found.numbers, found.different, found.largest.place, found.agrees
+    (2, 1, 'capacity.volume_m3[1]', True)
+    """
+    was, now = ({}, {}), ({}, {})
+    _sort(record, "", "", *was)
+    _sort(found, "", "", *now)
+    largest, beyond, different, count = None, [], 0, 0
+    for key, places in was[0].items():
+        worst, changed = _worst(key, places, now[0].get(key, {}))
+        count, different = count + len(places), different + changed
+        if worst is None:
+            continue
+        if worst.relative > worst.tolerance:
+            beyond.append(worst)
+        if largest is None or _over(worst) > _over(largest):
+            largest = worst
+    beyond.sort(key=_over, reverse=True)
+    same_version = record["tankcal"] == found["tankcal"]
+    return Recomputation(
+        made_by=_versions(record),
+        computed_by=_versions(found),
+        numbers=count,
+        different=different,
+        largest=largest,
+        beyond=tuple(beyond),
+        otherwise=tuple(_otherwise(was, now, same_version)),
+    )
+
+
+def _versions(record):
+    return {"tankcal": record["tankcal"], **record["versions"]}
+
+
+def _over(one):
+    return one.relative / one.tolerance
+
+
+def _sort(value, key, place, numbers, others):
+    """Put every value into numbers {key: {place: value}} or others {place: value}.
+
+    key    path without the places in lists: "capacity.volume_m3[]"
+    """
+    if key in UNCOMPARED:
+        return
+    if isinstance(value, dict):
+        for name, item in value.items():
+            _sort(item, f"{key}.{name}".lstrip("."), f"{place}.{name}".lstrip("."), numbers, others)
+    elif isinstance(value, list | tuple):
+        for number, item in enumerate(value):
+            _sort(item, f"{key}[]", f"{place}[{number}]", numbers, others)
+        others[f"{place}[]"] = len(value)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        numbers.setdefault(key, {})[place] = value
+    else:
+        others[place] = value
+
+
+def _worst(key, places, found):
+    """(NumberApart of the largest difference or None, how many differ) of one key."""
+    there = [place for place in places if place in found]
+    if not there:
+        return None, 0
+    one, two = (
+        np.array([values[place] for place in there], dtype=float) for values in (places, found)
+    )
+    apart = np.abs(one - two)
+    changed = int(np.count_nonzero(apart))
+    if not changed:
+        return None, 0
+    most, scale = int(np.argmax(apart)), float(np.abs(one).max())
+    relative = float(apart[most]) / scale if scale else np.inf
+    tolerance = TABLE_TOLERANCE if key.startswith(TABLE) else TOLERANCE
+    return NumberApart(
+        there[most], float(one[most]), float(two[most]), relative, tolerance
+    ), changed  # fmt: skip
+
+
+def _otherwise(was, now, same_version):
+    """(place, recorded, computed) of what is no number, or stands in one record only."""
+    flat = [
+        {**{k: v for places in numbers.values() for k, v in places.items()}, **others}
+        for numbers, others in (was, now)
+    ]
+    is_number = [set().union(*numbers.values()) for numbers, _ in (was, now)]
+    for place in dict.fromkeys((*flat[0], *flat[1])):
+        name = place.rpartition(".")[2]
+        if name.split("[")[0] in WORDS and not same_version:
+            continue
+        here, there = place in flat[0], place in flat[1]
+        if here and there:
+            if place in is_number[0] and place in is_number[1]:
+                continue
+            if flat[0][place] != flat[1][place]:
+                yield place, _shown(flat[0][place]), _shown(flat[1][place])
+        elif same_version or here:
+            yield place, *(_shown(one[place]) if place in one else "-" for one in flat)
+
+
+def _shown(value):
+    with suppress(TypeError, ValueError):
+        return f"{float(value):.10g}" if not isinstance(value, str | bool) else str(value)
+    return "null" if value is None else str(value)
