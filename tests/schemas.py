@@ -13,6 +13,16 @@ from tankcal.record.camera_stability import StabilityFile
 from tankcal.record.camera_versions import CAMERA
 from tankcal.record.comparison import COMPARISON, ComparisonFile
 from tankcal.record.inspection import INSPECTION, InspectionFile
+from tankcal.record.intercomparison import (
+    ANSWERS,
+    PACKAGE,
+    SCORES,
+    TRUTH,
+    AnswersFile,
+    PackageFile,
+    ScoresFile,
+    TruthFile,
+)
 from tankcal.record.making import Record
 from tankcal.record.plan import PLAN, PlanFile
 from tankcal.record.schema import json_schema
@@ -29,6 +39,10 @@ SAVED = (
     (WALL_PLAN, None, WallPlanFile),
     (COMPARISON, None, ComparisonFile),
     (INSPECTION, None, InspectionFile),
+    (PACKAGE, None, PackageFile),
+    (TRUTH, None, TruthFile),
+    (ANSWERS, None, AnswersFile),
+    (SCORES, None, ScoresFile),
 )
 
 

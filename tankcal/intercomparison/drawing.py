@@ -14,6 +14,8 @@ the shell. Sizes are those of tolerances of API 650 (radius 13 to 25 mm, peaking
 plumb 1/200) or below; those of buckles and lean are beyond it, as old tanks have them.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from tankcal.intercomparison.defects import (
@@ -84,7 +86,7 @@ def _of_courses(rng, joints):
             bulge_m=float(bulge * (1 + 0.2 * rng.normal())),
             bell=float(bell),
         )
-        for low, high in zip(joints[:-1], joints[1:], strict=True)
+        for low, high in pairwise(joints)
     ]
 
 
@@ -106,7 +108,7 @@ def _brick(rng, radius, joints):
     peak, flank = rng.choice([-1, 1]) * rng.uniform(2e-3, 10e-3), rng.uniform(0.1, 0.3)
     start = rng.uniform(0, FULL_TURN)
     found = []
-    for course, (low, high) in enumerate(zip(joints[:-1], joints[1:], strict=True)):
+    for course, (low, high) in enumerate(pairwise(joints)):
         for plate in range(plates):
             at = start + FULL_TURN * (plate + 0.5 * (course % 2) + 0.03 * rng.normal()) / plates
             size = peak * (1 + 0.3 * rng.normal())

@@ -1,6 +1,7 @@
 """Water metered in, twice, from the empty tank to near its top."""
 
 import datetime
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,45 +17,29 @@ FLOW_M3_H = 80.0
 BATCH_DIGITS = 4
 
 
+HEADINGS = [
+    *("run", "meter", "volume_m3", "dip_m"),
+    *("meter_temperature_c", "tank_temperature_c", "shell_temperature_c"),
+    *("flow_m3_h", "time"),
+]
+
+
 def observe_liquid(tank, chance, asked):
     """Two runs by one meter; the courses are those of the drawing, their radii unknown."""
-    rng = chance.rng
     site = observe_site(tank, chance, asked, outside=False)
     del site.parts.tables["bottom"]  # the first batch tells what lies below the first dip
-    factor = FACTOR * (1 + chance.normal(U_FACTOR))
-    zero = chance.normal(DIP_ZERO_SD_M)
-    rho0 = DENSITY_KG_M3 + chance.normal(U_DENSITY)
-    expansion = EXPANSION_PER_K + chance.normal(U_EXPANSION)
+    factor, zero = FACTOR * (1 + chance.normal(U_FACTOR)), chance.normal(DIP_ZERO_SD_M)
+    water = Water(
+        DENSITY_KG_M3 + chance.normal(U_DENSITY), EXPANSION_PER_K + chance.normal(U_EXPANSION)
+    )
     said_dip = chance.declared(1000 * DIP_SD_M)
-
-    def density(celsius):
-        return rho0 * (1 - expansion * (celsius - DENSITY_C))
-
-    rows = [["run", "meter", "volume_m3", "dip_m", "meter_temperature_c", "tank_temperature_c",
-             "shell_temperature_c", "flow_m3_h", "time"]]  # fmt: skip
-    clock = datetime.datetime(2026, 5, 4, 7, 0)
+    rows, clock = [HEADINGS], datetime.datetime(2026, 5, 4, 7, 0)
     for run, step in enumerate(STEPS_M, 1):
-        g, before, through = chance.normal(RUN_SD), 0.0, 0.0
         rows.append([str(run), "M-1", 0.0, "", "", "", "", "", clock.isoformat("T", "minutes")])
-        warm = 17.0 + rng.uniform(0, 2)
-        for dip in dips_of(tank, step):
-            meter_c, warm = warm + rng.normal(0.3, 0.2), warm + rng.normal(0.02, 0.02)
-            shell_c = warm + rng.normal(0.4, 0.1)
-            mass = held_kg(tank, dip, density(warm), shell_c)
-            shown = (mass - before) / density(meter_c) / (factor * (1 + g))
-            noise = chance.normal(np.hypot(REPEATS * shown, FIXED_M3))
-            read = round(float(shown + noise), BATCH_DIGITS)
-            before = mass
-            clock += datetime.timedelta(minutes=15 + round(60 * shown / FLOW_M3_H))
-            seen = round(float(dip + zero + chance.normal(DIP_SD_M)), 5)
-            felt = np.array([meter_c, warm, shell_c]) + chance.normal(U_TEMPERATURE_K, 3)
-            flow = round(float(FLOW_M3_H * rng.uniform(0.95, 1.05)), 1)
-            rows.append([str(run), "M-1", read, seen, *np.round(felt, 2 + 4 * (not chance.size)).tolist(),
-                         flow, clock.isoformat("T", "minutes")])  # fmt: skip
+        clock = _fill(site, rows, clock, str(run), dips_of(tank, step), water, factor, zero)
         clock += datetime.timedelta(days=2)
-    parts = site.parts
-    parts.tables["liquid"] = rows
-    parts.registers["meters"] = {
+    site.parts.tables["liquid"] = rows
+    site.parts.registers["meters"] = {
         "M-1": {
             "factor": FACTOR,
             "u_factor_ppm": 2e6 * U_FACTOR,
@@ -66,7 +51,7 @@ def observe_liquid(tank, chance, asked):
             "certificate": "simulated",
         }
     }
-    parts.settings |= {
+    site.parts.settings |= {
         "liquid.density_kg_m3": DENSITY_KG_M3,
         "liquid.density_temperature_c": DENSITY_C,
         "liquid.expansion_per_k": EXPANSION_PER_K,
@@ -79,6 +64,42 @@ def observe_liquid(tank, chance, asked):
         "liquid.u_radius_mm": 1000 * U_RADIUS_M,
     }
     return finish(site)
+
+
+@dataclass(frozen=True)
+class Water:
+    """The true liquid."""
+
+    density_kg_m3: float
+    expansion_per_k: float
+
+    def at(self, celsius):
+        """Its density at a temperature."""
+        return self.density_kg_m3 * (1 - self.expansion_per_k * (celsius - DENSITY_C))
+
+
+def _fill(site, rows, clock, run, dips, water, factor, zero):
+    """Add the rows of one run; the clock when it ends."""
+    tank, chance, rng = site.tank, site.chance, site.chance.rng
+    of_run, before = chance.normal(RUN_SD), 0.0
+    warm = 17.0 + rng.uniform(0, 2)
+    for dip in dips:
+        meter_c, warm = warm + rng.normal(0.3, 0.2), warm + rng.normal(0.02, 0.02)
+        shell_c = warm + rng.normal(0.4, 0.1)
+        mass = held_kg(tank, dip, water.at(warm), shell_c)
+        shown = (mass - before) / water.at(meter_c) / (factor * (1 + of_run))
+        read = shown + chance.normal(np.hypot(REPEATS * shown, FIXED_M3))
+        before = mass
+        clock += datetime.timedelta(minutes=15 + round(60 * shown / FLOW_M3_H))
+        seen = dip + zero + chance.normal(DIP_SD_M)
+        felt = np.array([meter_c, warm, shell_c]) + chance.normal(U_TEMPERATURE_K, 3)
+        felt = np.round(felt, 2 if chance.size else 6)
+        flow = FLOW_M3_H * rng.uniform(0.95, 1.05)
+        rows.append(
+            [run, "M-1", round(float(read), BATCH_DIGITS), round(float(seen), 5), *felt.tolist(),
+             round(float(flow), 1), clock.isoformat("T", "minutes")]
+        )  # fmt: skip
+    return clock
 
 
 def dips_of(tank, step_m):

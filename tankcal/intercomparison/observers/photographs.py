@@ -79,7 +79,7 @@ def _targets(rng, tank):
 
 
 def _stations(rng, site):
-    """Centres and rotations (into the image, third axis backwards), all around, every third upright."""
+    """Centres and rotations (into the image), all around; two of three are upright."""
     tank = site.tank
     off = max(6.0, 0.9 * tank.height_m)
     for k in range(STATIONS):
