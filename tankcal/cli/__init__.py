@@ -11,6 +11,7 @@ from tankcal.cli import (
     exporting,
     importing,
     inspecting,
+    intercomparison,
     linting,
     planning,
     reporting,
@@ -116,7 +117,7 @@ def _parser():
     commands = parser.add_subparsers(metavar="COMMAND")
 
     tables = (linting, table_reading, comparing, exporting, inspecting, verifying)
-    rooms = (running, reporting, starting, importing, planning, *tables, camera)
+    rooms = (running, reporting, starting, importing, planning, *tables, camera, intercomparison)
     for room in rooms:
         room.add(commands)
     if words_of_run():

@@ -1,8 +1,8 @@
 """Answers: empty forms, and answers of any program read with all their problems at once."""
 
 import csv
-import datetime
 import io
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,20 +19,38 @@ from tankcal.record.intercomparison import ANSWERS, Answer, AnswersFile, Partici
 
 PARTICIPANT = "participant.toml"
 ROWS = (
-    number("height_m", "height above the dip plate, as asked, metres", -100, 100, required=True),
+    number(
+        "height_m",
+        message("ic_note_height", "height above the dip plate, as asked, metres"),
+        -100,
+        100,
+        required=True,
+    ),
     number("volume_m3", "volume below it, cubic metres; blank: not answered", 0, 1e7),
     positive("U_m3", "its expanded uncertainty, cubic metres; blank: not stated", 1e6),
     positive("k", "coverage factor of U_m3; blank: not stated", 100),
     positive("coverage", "coverage probability of U_m3, in place of k", 0.999999),
 )
 KEYS = (
-    Field("name", "text", "name of the participant", required=True),
-    Field("software", "text", "software that computed the answers", required=True),
-    Field("version", "text", "version of the software", required=True),
-    Field("package", "text", "truth_sha256 of the package's manifest.json", required=True),
-    Field("date", "date", "day of the answers, year-month-day"),
-    Field("contact", "text", "how to reach the participant"),
-    Field("remarks", "text", "anything that is to stand beside the scores"),
+    Field("name", "text", message("ic_note_name", "name of the participant"), required=True),
+    Field(
+        "software",
+        "text",
+        message("ic_note_software", "software that computed the answers"),
+        required=True,
+    ),
+    Field("version", "text", message("ic_note_version", "version of the software"), required=True),
+    Field(
+        "package",
+        "text",
+        message("ic_note_package", "truth_sha256 of the package's manifest.json"),
+        required=True,
+    ),
+    Field("date", "date", message("ic_note_date", "day of the answers, year-month-day")),
+    Field("contact", "text", message("ic_note_contact", "how to reach the participant")),
+    Field(
+        "remarks", "text", message("ic_note_remarks", "anything that is to stand beside the scores")
+    ),
 )
 CSV_KEYS = (
     choice("separator", "between the columns of the tables", SEPARATORS),
@@ -42,8 +60,11 @@ SECTIONS = {"participant": KEYS, "csv": CSV_KEYS}
 SAME_M = 1e-6  # heights that are one
 MOST_NAMED = 5
 ABOUT = (
-    "# Who answers, with what. Tables with ; and decimal commas: say so under [csv].",
-    "# docs: README.md of the package",
+    message(
+        "ic_about_participant",
+        "Who answers, with what. Tables with ; and decimal commas: say so under [csv].",
+    ),
+    message("ic_about_readme", "The formats: README.md of the package"),
 )
 
 
@@ -67,13 +88,16 @@ def file_of(tank, method):
 # ---- written
 
 
-def template_files(manifest):
-    """{name: bytes} of empty forms for every survey of a package."""
-    lines = [*ABOUT, "[participant]"]
-    lines += [f'{one.name} = "{manifest["truth_sha256"]}"' if one.name == "package" else
-              f'{"" if one.required else "# "}{one.name} = ""  # {one.note}' if one.kind == "text"
-              else f"# {one.name} = {datetime.date(2026, 1, 31)}  # {one.note}"
-              for one in KEYS]  # fmt: skip
+def template_files(manifest, said=str):
+    """{name: bytes} of empty forms for every survey of a package.
+
+    said  said(message) gives a comment in the language of whoever fills it in
+    """
+    lines = [*(f"# {said(one)}" for one in ABOUT), "", "[participant]"]
+    for one in KEYS:
+        value = manifest["truth_sha256"] if one.name == "package" else ""
+        value = "2026-01-31" if one.kind == "date" else _quoted(value)
+        lines.append(f"{'' if one.required else '# '}{one.name} = {value}  # {said(one.note)}")
     lines += ["", "# [csv]", '# separator = ";"', '# decimal = ","', ""]
     files = {PARTICIPANT: "\n".join(lines).encode()}
     heights = {one["tank"]: one["heights_m"] for one in manifest["tanks"]}
@@ -113,8 +137,6 @@ def _cell(value):
 
 
 def _quoted(text):
-    import json
-
     return json.dumps(text, ensure_ascii=False)
 
 

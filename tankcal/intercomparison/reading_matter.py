@@ -16,9 +16,9 @@ HEAD = """# Every key and column
 
 What stands in the files of this package. A name ends with its unit: `_m` metres, `_mm`
 millimetres, `_deg` degrees, `_c` degrees Celsius, `_m3` cubic metres, `_ppm` parts per million;
-`s_` is a standard deviation, `u_` a standard uncertainty. CSV files have one row of headings,
-commas and decimal points. Scans are LAS 1.2, point format 0, metres in steps of {step} m, in the scanner's own
-frame: the scanner is at its origin, and it stands a little out of level.
+`s_` is a standard deviation, `u_` a standard uncertainty. CSV files have a row of headings, commas
+and decimal points. Scans are LAS 1.2, point format 0, metres in steps of {step} m, in the scanner's
+own frame: the scanner is at its origin, and it stands a little out of level.
 """
 
 
