@@ -204,7 +204,7 @@ class Tank:
         cool = np.array(
             [self._shell_m3(one, rho, order) for one, rho in zip(levels, density * f, strict=True)]
         )
-        cool += self._floor_m3(2 if more else 1)
+        cool += self._floor_m3(2) if more else self._below_foot_m3
         for one in self.fittings:
             part = np.clip((levels - one.low_m) / (one.high_m - one.low_m), 0, 1)
             cool += one.volume_m3 * part
@@ -215,7 +215,7 @@ class Tank:
         few = self.volumes_m3(dips_m, density_kg_m3)
         return float(np.abs(few - self.volumes_m3(dips_m, density_kg_m3, more=True)).max())
 
-    @property
+    @cached_property
     def lowest_level_m(self):
         """Level, above the foot of the shell, from which the bottom is covered."""
         r = np.linspace(0, self.radius_m, 200)
@@ -267,6 +267,10 @@ class Tank:
         plate = np.asarray(self.plates_m)[self.course_at(z)]
         out = density * GRAVITY * (level - z) * self.radius_m**2 / (self.e_pa * plate)
         return area + out * length + np.pi * out**2
+
+    @cached_property
+    def _below_foot_m3(self):
+        return self._floor_m3(1)
 
     def _floor_m3(self, more):
         """Between the bottom and the plane of the foot of the shell, above 0 where it is deeper."""
