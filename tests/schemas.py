@@ -14,6 +14,16 @@ from tankcal.record.camera_versions import CAMERA
 from tankcal.record.comparison import COMPARISON, ComparisonFile
 from tankcal.record.history import HISTORY, HistoryFile
 from tankcal.record.inspection import INSPECTION, InspectionFile
+from tankcal.record.intercomparison import (
+    ANSWERS,
+    PACKAGE,
+    SCORES,
+    TRUTH,
+    AnswersFile,
+    PackageFile,
+    ScoresFile,
+    TruthFile,
+)
 from tankcal.record.making import Record
 from tankcal.record.plan import PLAN, PlanFile
 from tankcal.record.schema import json_schema
@@ -31,6 +41,10 @@ SAVED = (
     (COMPARISON, None, ComparisonFile),
     (INSPECTION, None, InspectionFile),
     (HISTORY, None, HistoryFile),
+    (PACKAGE, None, PackageFile),
+    (TRUTH, None, TruthFile),
+    (ANSWERS, None, AnswersFile),
+    (SCORES, None, ScoresFile),
 )
 
 

@@ -13,6 +13,7 @@ from tankcal.cli import (
     history,
     importing,
     inspecting,
+    intercomparison,
     linting,
     pages,
     planning,
@@ -137,8 +138,8 @@ def _parser_in_english():
     commands = parser.add_subparsers(metavar="COMMAND")
 
     tables = (linting, table_reading, comparing, history, exporting, inspecting, verifying)
-    rooms = (running, reporting, starting, importing, planning, *tables, camera)
-    for room in rooms:
+    others = (camera, intercomparison)
+    for room in (running, reporting, starting, importing, planning, *tables, *others):
         room.add(commands)
     pages.add(commands)
     completing.add(commands, _parser_in_english)

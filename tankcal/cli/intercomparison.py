@@ -1,0 +1,292 @@
+"""`tankcal intercomparison`: packages of simulated surveys, answers to them, scores."""
+
+from pathlib import Path
+
+from tankcal.cli.arguments import add_language, parse_count, refuse_argument
+from tankcal.cli.machine import add_json, print_json
+from tankcal.cli.showing import (
+    Progress,
+    language_of_run,
+    marks,
+    prepare_for_small_work,
+    print_paths,
+    say,
+    say_in_language,
+    speak,
+    warn,
+)
+from tankcal.messages import message
+from tankcal.text.digits import NOTHING, fixed
+
+METHODS = (
+    *("points", "photographs", "total-station", "tape", "reference-line", "cloud", "liquid"),
+)
+MOST_WARNINGS = 20  # that are shown
+MOST_TANKS = 100
+
+
+def add(commands):
+    """The parser of `tankcal intercomparison` and its commands."""
+    parser = commands.add_parser(
+        "intercomparison",
+        help="packages of simulated surveys with sealed truth, answers of any software, scores",
+        description="A proficiency test of software that calibrates tanks: make a package of "
+        "simulated surveys whose true volumes are sealed, answer it, score answers of any "
+        "software. docs/intercomparison.md has the formats and the formulas.",
+    )
+    parser.set_defaults(shown=parser)
+    inner = parser.add_subparsers(metavar="WHAT")
+    _add_make(inner)
+    _add_template(inner)
+    _add_answer(inner)
+    _add_score(inner)
+
+
+def _add_make(commands):
+    make = commands.add_parser(
+        "make",
+        help="draw tanks, survey them, seal their volumes",
+        description="Write package (to publish), sealed/truth.json (to keep until all answers are "
+        "in) and practice (the same with its truth) into a new folder. The SHA-256 of the truth "
+        "stands in the package.",
+    )
+    make.add_argument("directory", metavar="DIR", help="the folder to make")
+    make.add_argument("--tanks", metavar="N", type=_tanks, default=6, help="how many (default: 6)")
+    make.add_argument(
+        "--practice", metavar="N", type=_tanks_or_none, default=1,
+        help="tanks for practice, with their truth (default: 1; 0: none)",
+    )  # fmt: skip
+    make.add_argument(
+        "--seed", metavar="S", type=parse_count, default=1, help="of the draws (default: 1)"
+    )
+    make.add_argument(
+        "--secret", metavar="HEX", type=_secret,
+        help="64 hexadecimal digits out of a truth file, to make its package again (default: by "
+        "lot)",
+    )  # fmt: skip
+    make.add_argument(
+        "--methods", metavar="METHOD", nargs="+", choices=METHODS, default=list(METHODS),
+        help=f"of the surveys: {', '.join(METHODS)} (default: all)",
+    )  # fmt: skip
+    _add_common(make)
+    make.set_defaults(command=_make)
+
+
+def _add_template(commands):
+    template = commands.add_parser(
+        "template",
+        help="write empty forms for the answers to a package",
+        description="Write participant.toml and a table for each survey, with the heights that "
+        "are asked and nothing else.",
+    )
+    template.add_argument("package", metavar="PACKAGE", help="the folder of a package")
+    template.add_argument("--out", metavar="ANSWERS", required=True, help="the folder to make")
+    _add_common(template)
+    template.set_defaults(command=_template)
+
+
+def _add_answer(commands):
+    answer = commands.add_parser(
+        "answer",
+        help="compute a package by tankcal and write its answers",
+        description="Run tankcal on every survey of a package and write the answers as any "
+        "participant does.",
+    )
+    answer.add_argument("package", metavar="PACKAGE", help="the folder of a package")
+    answer.add_argument("--out", metavar="ANSWERS", required=True, help="the folder to make")
+    _add_common(answer)
+    answer.set_defaults(command=_answer)
+
+
+def _add_score(commands):
+    score = commands.add_parser(
+        "score",
+        help="score answers against the truth",
+        description="Check that the truth is the one that was sealed, and tell error, E_n, "
+        "coverage and form of every table, of several participants together.",
+        epilog="exit status: 0 done, whatever the scores; 2 answers or truth must be mended (one "
+        "line per problem).",
+    )
+    score.add_argument("names", metavar="ANSWERS", nargs="+", help="folders of answers")
+    score.add_argument("--truth", metavar="TRUTH", required=True, help="truth.json, or its folder")
+    score.add_argument(
+        "--package", metavar="PACKAGE", help="the package: its manifest must name this truth, too"
+    )
+    score.add_argument(
+        "--out", metavar="DIR", help="write scores.json, page and workbook there, all or nothing"
+    )
+    _add_common(score)
+    add_json(score)
+    score.set_defaults(command=_score)
+
+
+def _add_common(parser):
+    add_language(parser)
+    parser.add_argument("--quiet", action="store_true", help="no progress, only problems")
+
+
+def _tanks(text):
+    value = _tanks_or_none(text)
+    if value == 0:
+        raise refuse_argument(message("option_tanks", "found {text!r}; expected a whole number "
+                                      "from 1 to {most}", text=text, most=MOST_TANKS))  # fmt: skip
+    return value
+
+
+def _tanks_or_none(text):
+    value = parse_count(text)
+    if not 0 <= value <= MOST_TANKS:
+        raise refuse_argument(message("option_tanks_or_none", "found {text!r}; expected a whole "
+                                      "number from 0 to {most}", text=text,
+                                      most=MOST_TANKS))  # fmt: skip
+    return value
+
+
+def _secret(text):
+    if len(text) != 64 or set(text.lower()) - set("0123456789abcdef"):
+        raise refuse_argument(message("option_secret", "found {text!r}; expected 64 hexadecimal "
+                                      "digits", text=text[:70]))  # fmt: skip
+    return text.lower()
+
+
+# ---- the commands
+
+
+def _make(options):
+    import secrets
+
+    from tankcal.intercomparison.package import make_package, write_files
+    from tankcal.record.intercomparison import TRUTH
+    from tankcal.report.folders import replaced
+
+    prepare_for_small_work()
+    speak(options.language)
+    out = Path(options.directory)
+    _refuse_existing(out)
+    show = Progress(options.quiet)
+    methods = [one for one in METHODS if one in options.methods]
+    secret = options.secret or secrets.token_hex(32)
+    made = make_package(options.tanks, options.seed, methods, secret=secret, progress=show.part)
+    with replaced(out) as folder:
+        write_files(folder / "package", made.files)
+        write_files(folder / "sealed", {TRUTH.file: made.truth})
+        if options.practice:
+            practice = make_package(
+                options.practice, options.seed, methods, is_open=True, progress=show.part
+            )
+            write_files(folder / "practice", {**practice.files, TRUTH.file: practice.truth})
+    show.end()
+    say(message("ic_keep_sealed", "keep {file} to yourself until all answers are in; its SHA-256 "
+                "stands in {manifest}", file=str(out / "sealed" / TRUTH.file),
+                manifest=str(out / "package" / "manifest.json")))  # fmt: skip
+    print_paths(out, ["package", "sealed", *(["practice"] if options.practice else [])])
+
+
+def _template(options):
+    from tankcal.intercomparison.answers import template_files
+    from tankcal.intercomparison.package import write_files
+    from tankcal.report.folders import replaced
+
+    speak(options.language)
+    _refuse_existing(options.out)
+    manifest = _package(options.package)
+    files = template_files(manifest, say_in_language)
+    with replaced(options.out) as folder:
+        write_files(folder, files)
+    print_paths(options.out, sorted(files))
+
+
+def _answer(options):
+    from tankcal.intercomparison.answers import answer_files
+    from tankcal.intercomparison.own_answers import answer_package
+    from tankcal.intercomparison.package import write_files
+    from tankcal.report.folders import replaced
+
+    prepare_for_small_work()
+    speak(options.language)
+    _refuse_existing(options.out)
+    manifest = _package(options.package)
+    show = Progress(options.quiet)
+    saved, told = answer_package(options.package, manifest, show.part)
+    show.end()
+    warn(told)
+    files = answer_files(saved)
+    with replaced(options.out) as folder:
+        write_files(folder, files)
+    print_paths(options.out, sorted(files))
+
+
+def _score(options):
+    prepare_for_small_work()
+    speak(options.language)
+    from tankcal.intercomparison.judging import score_folders
+    from tankcal.record.intercomparison import plain_of
+
+    if options.out is not None:
+        from tankcal.report.scores import refuse_foreign, write_scores
+
+        refuse_foreign(options.out)
+    show = Progress(options.quiet or options.machine)
+    show.step(message("ic_scoring", "scoring {count} folders of answers",
+                      count=len(options.names)))  # fmt: skip
+    found = plain_of(score_folders(options.names, options.truth, options.package))
+    written = ()
+    if options.out is not None:
+        written = write_scores(found, options.out, language_of_run(), show.step)
+    show.end()
+    if options.machine:
+        print_json(exit_status=0, **found)
+        return
+    _tell(found)
+    if written:
+        print_paths(Path(options.out), [path.name for path in written])
+
+
+def _refuse_existing(out):
+    """Raise InputError where the folder to make is there already, and not empty."""
+    from tankcal.report.folders import refuse_foreign
+
+    refuse_foreign(out, ())
+
+
+def _package(folder):
+    """The manifest of a package; raises InputError with all that is wrong."""
+    from tankcal.intercomparison.package import load_package
+    from tankcal.job.tables import Log
+
+    log = Log()
+    manifest = load_package(folder, log)
+    log.stop_if_problems()
+    return manifest
+
+
+def _tell(found):
+    """Warnings, then a line for each participant and method."""
+    from tankcal.report.scores import ScoresPaper
+
+    paper = ScoresPaper(found, language_of_run())
+    warn(paper.warning(one) for one in found["warnings"][:MOST_WARNINGS])
+    for one in found["methods"]:
+        values = {
+            "who": paper.participant(one),
+            "method": paper.method(one["method"]),
+            "tables": one["tables"],
+            "asked": one["asked"],
+            "rms": _ppm(one["rms_top_ppm"]),
+            "U": _ppm(one["mean_U_ppm"]),
+            "within": one["tops_within"],
+            "judged": one["tops_judged"],
+            "zeta": NOTHING if one["rms_zeta"] is None else fixed(one["rms_zeta"], 2, marks()),
+        }
+        say(
+            message(
+                "ic_score",
+                "{who}, {method}: {tables} of {asked} tables, rms {rms} ppm, U {U} ppm, |E_n| <= 1 "
+                "at {within} of {judged} tops, zeta {zeta} rms",
+                **values,
+            )
+        )
+
+
+def _ppm(value):
+    return NOTHING if value is None else fixed(value, 0, marks())

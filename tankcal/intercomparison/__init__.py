@@ -1,0 +1,1 @@
+"""Comparison of software: tanks by lot, surveys of them, sealed truth, answers and their scores."""

@@ -1,0 +1,75 @@
+"""A tape round the outside of every course: it lies on the convex hull of the shell."""
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from tankcal.intercomparison.defects import FULL_TURN
+from tankcal.intercomparison.site import finish, observe_site
+
+LEVELS, REPEATS = (0.2, 0.8), 2
+U_SCALE, TAPE_EXPANSION, TAPE_C, TAPE_N = 12e-6, 1.15e-5, 20.0, 50.0
+THICK_M, SECTION_MM2, TAPE_E_GPA, LAYING_M, READ_M = 2e-4, 2.5, 206.0, 3e-4, 4e-4
+PULL_SD_N = 3.0  # of the mean pull round the tank against what is read
+LONGEST_STEP_M = 0.004  # between the places that the hull is made of
+
+
+def girth_m(tank, z):
+    """Perimeter of the convex hull of the outside at a height of the cool tank.
+
+    What a polygon is short of the curve between its corners is made good as for a circle.
+    """
+    count = int(FULL_TURN * tank.radius_m / LONGEST_STEP_M)
+    azimuth = FULL_TURN * (np.arange(count) + 0.5) / count
+    places = tank.places_m(azimuth, np.full(count, float(z)), outside=True)[:, :2]
+    half = np.pi / count
+    return float(ConvexHull(places - places.mean(axis=0)).area * half / np.sin(half))
+
+
+def observe_tape(tank, chance, asked):
+    """Two levels of each course, twice each."""
+    site = observe_site(tank, chance, asked, outside=True)
+    strap(site, range(len(tank.courses_m)))
+    form = _shape_m(tank)
+    site.parts.settings["shell.shape_sd_mm"] = chance.declared(1000 * form, 1)
+    return finish(site)
+
+
+def strap(site, courses, repeats=REPEATS):
+    """Put circumferences of these courses and their tape into the parts of a site."""
+    tank, chance, parts = site.tank, site.chance, site.parts
+    scale, read_sd = chance.normal(U_SCALE), chance.declared(1000 * READ_M)
+    stiff_n = SECTION_MM2 * 1e-6 * TAPE_E_GPA * 1e9
+    rows = [["circumference", "course", "level_m", "reading_m", "s_mm", "tension_n"]]
+    for course in courses:
+        for part in LEVELS:
+            z = tank.joints_m[course] + part * tank.courses_m[course]
+            true = site.grown * girth_m(tank, z) + np.pi * THICK_M
+            for _ in range(repeats):
+                pull = float(np.round(chance.rng.uniform(45, 60)))
+                unit = (1 + scale) * (1 + TAPE_EXPANSION * (site.shell_c - TAPE_C))
+                unit *= 1 + (pull + chance.normal(PULL_SD_N) - TAPE_N) / stiff_n
+                error = chance.normal(LAYING_M) + chance.normal(READ_M)
+                reading = round(float(true / unit + error), 5)
+                level = round(float(site.level(z)), 4)
+                name = f"{course + 1}-{round(100 * part)}"
+                rows.append([name, str(course + 1), level, reading, read_sd, pull])
+    parts.tables["circumferences"] = rows
+    parts.registers.setdefault("instruments", {})["T-1"] = {
+        "kind": "tape",
+        "certificate": "simulated",
+        "certified_temperature_c": TAPE_C,
+        "tension_n": TAPE_N,
+        "expansion_per_k": TAPE_EXPANSION,
+        "thickness_mm": 1000 * THICK_M,
+        "section_mm2": SECTION_MM2,
+        "e_gpa": TAPE_E_GPA,
+        "u_scale_ppm": 1e6 * U_SCALE,
+        "laying_mm": 1000 * LAYING_M,
+    }
+
+
+def _shape_m(tank):
+    """Standard deviation of the radius round the wall, over its courses."""
+    azimuth = FULL_TURN * np.arange(2048) / 2048
+    middles = (tank.joints_m[:-1] + tank.joints_m[1:]) / 2
+    return float(np.sqrt(np.mean([np.var(tank.radii_m(azimuth, z)) for z in middles])))

@@ -1,0 +1,224 @@
+"""What every survey of a tank shares: errors by lot, what is declared, and the parts of a job."""
+
+import datetime
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tankcal.intercomparison.defects import FULL_TURN
+from tankcal.intercomparison.tank import REFERENCE_C
+
+NOMINAL_E_GPA, U_E_GPA = 206.0, 2.0
+NOMINAL_EXPANSION, U_EXPANSION = 1.15e-5, 4e-7
+U_PLATE_M, U_PAINT_M, U_COURSE_M, U_ZERO_M, U_SHELL_K = 1.5e-4, 5e-5, 1e-3, 1e-3, 1.0
+FLOOR_POINTS, FLOOR_SD_M = (4, 8, 12, 16, 20), 1.5e-3  # on rings round the middle; of levelling
+FITTING_PART = 0.02  # standard uncertainty of the volume of a thing
+STEP_M = 0.01  # of the table that is asked for
+
+
+@dataclass
+class Chance:
+    """Errors by lot; size 0: a perfect crew, whose readings are the truth."""
+
+    rng: np.random.Generator
+    size: float = 1.0
+
+    def normal(self, sd, shape=None):
+        """Normal errors of a standard deviation."""
+        return self.size * sd * self.rng.normal(size=shape)
+
+    def declared(self, sd, digits=2):
+        """What a crew declares of a standard deviation: the truth, or a little more or less."""
+        factor = np.exp(0.15 * self.rng.normal()) if self.rng.uniform() < 0.5 else 1.0
+        return float(f"{sd * (factor if self.size else 1.0):.{digits}g}")
+
+    def blunders(self, count, share):
+        """(k,) numbers of the readings that are spoilt: this share of them, about."""
+        if not self.size:
+            return np.empty(0, dtype=int)
+        return np.flatnonzero(self.rng.uniform(size=count) < share)
+
+
+@dataclass
+class Parts:
+    """The files of a job, before they are written.
+
+    settings   {"section.key": value} of job.toml
+    tables     {name: [headings, row, ...]} of CSV files
+    registers  {"instruments": {name: {key: value}}} of further TOML files
+    files      {path: bytes} beside them
+    """
+
+    settings: dict
+    tables: dict = field(default_factory=dict)
+    registers: dict = field(default_factory=dict)
+    files: dict = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Site:
+    """A tank on the day of one survey.
+
+    shell_c    true temperature of the shell     grown  by how much lengths are longer than cool
+    frame_m    (3,) the foot of the axis in the frame of the survey
+    zero_m     the dip plate as levelled, above the foot of the shell
+    inputs     rows of uncertainty.csv so far
+    """
+
+    tank: object
+    chance: Chance
+    outside: bool
+    shell_c: float
+    frame_m: np.ndarray
+    zero_m: float
+    parts: Parts
+    inputs: list
+
+    @property
+    def grown(self):
+        return self.tank.grown(self.shell_c)
+
+    def places(self, azimuth, z, off_m=0.0, outside=None):
+        """(n, 3) true places of the warm wall in the frame of the survey; z of the cool tank."""
+        outside = self.outside if outside is None else outside
+        cool = self.tank.places_m(azimuth, z, 0.0, outside)
+        if np.any(off_m):
+            ray = np.column_stack([np.sin(azimuth), np.cos(azimuth), np.zeros(len(cool))])
+            cool = cool + np.asarray(off_m)[..., None] * ray / self.grown
+        return self.frame_m + self.grown * cool
+
+    def level(self, z):
+        """Height above the table's zero, as the crew reads it, of heights of the cool tank."""
+        return self.grown * np.asarray(z) - self.zero_m
+
+    def add_input(self, name, u, unit, note):
+        """A row of uncertainty.csv."""
+        self.inputs.append([name, u, unit, note])
+
+
+def observe_site(tank, chance, asked, *, outside, frame_m=(0.0, 0.0, 0.0)):
+    """The `Site` of one survey: course heights, plates, bottom and things as a crew declares them.
+
+    asked  `Asked` of the tank: what the table is to be for
+    """
+    shell_c = float(np.round(chance.rng.uniform(12.0, 32.0), 1))
+    read_c = round(shell_c + float(chance.normal(U_SHELL_K)), 1)
+    frame = np.asarray(frame_m, float)
+    f = tank.grown(shell_c)
+    zero = f * tank.plate_z_m + float(chance.normal(U_ZERO_M))
+    parts = Parts(_settings(tank, asked, outside, read_c, frame, zero))
+    site = Site(tank, chance, outside, shell_c, frame, zero, parts, [])
+    parts.tables["courses"] = _courses(site)
+    parts.tables["bottom"] = _bottom(site)
+    parts.tables["deadwood"] = _fittings(site)
+    head = asked.density_kg_m3 > 0
+    site.add_input("datum", 1000 * U_ZERO_M, "mm", "levelling of the dip plate")
+    site.add_input("course_heights", 1000 * U_COURSE_M, "mm", "tape along the shell")
+    site.add_input("shell_temperature", U_SHELL_K, "K", "contact thermometer")
+    site.add_input("expansion", U_EXPANSION, "1/K", "handbook")
+    if outside or head:
+        site.add_input("plate_thickness", 1000 * U_PLATE_M, "mm", "ultrasonic gauge")
+    if outside:
+        site.add_input("paint", 1000 * U_PAINT_M, "mm", "coating gauge")
+    if head:
+        site.add_input("youngs_modulus", U_E_GPA, "GPa", "handbook")
+    return site
+
+
+def finish(site):
+    """The Parts of a site, with its inputs."""
+    site.parts.tables["uncertainty"] = [["input", "u", "unit", "note"], *site.inputs]
+    return site.parts
+
+
+def _settings(tank, asked, outside, read_c, frame, zero):
+    return {
+        "tank.id": tank.name,
+        "tank.kind": "vertical",
+        "tank.nominal_diameter_m": round(2 * tank.radius_m, 2),
+        "tank.nominal_height_m": round(tank.height_m, 1),
+        "survey.side": "outside" if outside else "inside",
+        "survey.date": datetime.date(2026, 5, 4),
+        "survey.shell_temperature_c": read_c,
+        "datum.bottom_z_m": float(frame[2]),
+        "datum.dip_plate_z_m": round(float(frame[2] + zero), 5),
+        "table.step_m": STEP_M,
+        "table.reference_temperature_c": asked.reference_temperature_c,
+        "table.liquid_density_kg_m3": asked.density_kg_m3,
+        "material.e_gpa": NOMINAL_E_GPA,
+        "material.expansion_per_k": NOMINAL_EXPANSION,
+        "certificate.notice": "SIMULATION",
+        "certificate.condition_of_tank": "No tank: a simulated survey of a comparison of software",
+    }
+
+
+def _courses(site):
+    """Heights along the shell, plates and paint as measured, the last two with one error each."""
+    tank, chance = site.tank, site.chance
+    along = np.hypot(1, np.hypot(*tank.lean))
+    heights = tank.courses_m * np.array(along) + chance.normal(U_COURSE_M, len(tank.courses_m))
+    plate, paint = chance.normal(U_PLATE_M), chance.normal(U_PAINT_M)
+    rows = [["course", "height_m", "thickness_mm", "paint_mm"][: 4 if site.outside else 3]]
+    for k, (height, true) in enumerate(zip(heights, tank.plates_m, strict=True), 1):
+        said = [round(1000 * float(one), 3) for one in (true + plate, tank.paint_m + paint)]
+        rows.append([str(k), round(float(height), 5), *said[: len(rows[0]) - 2]])
+    return rows
+
+
+def _bottom(site):
+    """Levelled points on rings round the middle, and close to the wall."""
+    tank, chance = site.tank, site.chance
+    rows = [["x_m", "y_m", "z_m", "s_mm"]]
+    places = [(0.0, 0.0)]
+    for ring, count in enumerate(FLOOR_POINTS, 1):
+        r = tank.radius_m * min(ring / len(FLOOR_POINTS), 0.985)
+        turn = FULL_TURN * (np.arange(count) + 0.5 * (ring % 2)) / count
+        places += list(zip(r * np.sin(turn), r * np.cos(turn), strict=True))
+    x, y = np.array(places).T
+    z = tank.floor.height_m(x, y, tank.radius_m)
+    seen = site.frame_m + site.grown * np.column_stack([x, y, z])
+    seen[:, 2] += chance.normal(FLOOR_SD_M, len(seen))
+    return rows + [[*np.round(one, 5).tolist(), 1000 * FLOOR_SD_M] for one in seen]
+
+
+def _fittings(site):
+    """Things in the tank: their dips, volumes from drawings, u of each."""
+    tank, chance = site.tank, site.chance
+    rows = [["name", "bottom_m", "top_m", "volume_m3", "u_m3"]]
+    for one in tank.fittings:
+        u = max(FITTING_PART * abs(one.volume_m3), 1e-3)
+        volume = one.volume_m3 + chance.normal(u)
+        low, high = np.round(np.array([one.low_m, one.high_m]) - tank.plate_z_m, 4)
+        rows.append([one.name, float(low), float(high), round(float(volume), 5), round(u, 5)])
+    return rows
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a table of a tank is asked for.
+
+    dips_m  heights above the dip plate at which volumes are wanted
+    """
+
+    dips_m: tuple
+    density_kg_m3: float = 0.0
+    reference_temperature_c: float = REFERENCE_C
+
+
+def ask(tank, density_kg_m3):
+    """The `Asked` of a tank: every half metre, and pairs 1 cm, 10 cm and 2 m apart.
+
+    The pairs of deliveries of 1 and 10 cm stand in the middle of every course and across every
+    weld between courses, where a table by sections has its corners.
+    """
+    lowest = tank.lowest_level_m - tank.plate_z_m
+    top = np.floor(100 * (tank.height_m - tank.plate_z_m - 0.02)) / 100
+    first = max(np.ceil(100 * (lowest + 0.05)) / 100, 0.3)
+    dips = {first, top, *np.arange(0.5, top, 0.5)}
+    joints = tank.joints_m - tank.plate_z_m
+    places = [*(joints[:-1] + joints[1:]) / 2, *(joints[1:-1] - 0.05)]
+    for place in places:
+        low = np.round(place, 2)
+        dips |= {low, low + 0.01, low + 0.1}
+    found = sorted({round(float(one), 2) for one in dips if first - 1e-9 <= one <= top + 1e-9})
+    return Asked(tuple(found), density_kg_m3)

@@ -1,0 +1,50 @@
+"""The files of a job, written from its parts."""
+
+import csv
+import io
+import json
+from datetime import date
+
+
+def job_files(parts):
+    """{path: bytes} of a job's folder."""
+    files = {"job.toml": toml_text(_sections(parts.settings)).encode()}
+    for name, rows in parts.tables.items():
+        if len(rows) > 1:
+            files[f"{name}.csv"] = csv_text(rows).encode()
+    for name, entries in parts.registers.items():
+        named = {f"{name}.{json.dumps(key)}": entry for key, entry in entries.items()}
+        files[f"{name}.toml"] = toml_text(named).encode()
+    return files | parts.files
+
+
+def csv_text(rows, separator=","):
+    """Rows as CSV."""
+    stream = io.StringIO()
+    csv.writer(stream, delimiter=separator, lineterminator="\n").writerows(rows)
+    return stream.getvalue()
+
+
+def toml_text(sections):
+    """{section: {key: value}} as TOML."""
+    parts = []
+    for section, entries in sections.items():
+        lines = [f"{key} = {_value(one)}" for key, one in entries.items()]
+        parts.append("\n".join([f"[{section}]", *lines]) + "\n")
+    return "\n".join(parts)
+
+
+def _sections(settings):
+    found = {}
+    for path, value in settings.items():
+        section, _, key = path.rpartition(".")
+        found.setdefault(section, {})[key] = value
+    return found
+
+
+def _value(value):
+    if isinstance(value, date):
+        return value.isoformat()
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    return json.dumps(value, ensure_ascii=False)

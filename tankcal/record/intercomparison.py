@@ -1,0 +1,207 @@
+"""A comparison of software as it is saved: package, sealed truth, answers and scores."""
+
+import tankcal
+from tankcal.record.plain_data import to_plain
+from tankcal.record.saved_formats import SavedFormat
+from tankcal.record.schema import Finite, Saved, key
+from tankcal.record.texts import WarningRecord
+
+PACKAGE = SavedFormat("tankcal-intercomparison-package", 1, "manifest.json")
+TRUTH = SavedFormat("tankcal-intercomparison-truth", 1, "truth.json")
+ANSWERS = SavedFormat("tankcal-intercomparison-answers", 1, "answers.json")
+SCORES = SavedFormat("tankcal-intercomparison-scores", 1, "scores.json")
+
+
+# ---- the package
+
+
+class FileHash(Saved):
+    """A file of the package."""
+
+    file: str = key("path within the package")
+    sha256: str = key("hexadecimal digits")
+
+
+class AskedTank(Saved):
+    """What is asked of a tank, the same for all methods."""
+
+    tank: str = key("name")
+    heights_m: list[Finite] = key("above the dip plate, at which volumes are wanted")
+    reference_temperature_c: Finite = key("of the shell")
+    liquid_density_kg_m3: Finite = key("of the head that widens the shell; 0: empty shell")
+
+
+class AskedJob(Saved):
+    """One survey of one tank."""
+
+    tank: str = key("name")
+    method: str = key("name")
+    folder: str = key("of its files within the package")
+
+
+class PackageFile(Saved):
+    """What a package says of itself."""
+
+    tankcal: str = key("version that made it")
+    open: bool = key("whether its truth lies beside it, for practice")
+    licence: str = key("SPDX name")
+    coverage_probability: Finite = key("of the expanded uncertainties that are asked for")
+    truth_sha256: str = key("of the file truth.json, byte by byte: the commitment")
+    tanks: list[AskedTank] = key("what is asked")
+    jobs: list[AskedJob] = key("every survey")
+    files: list[FileHash] = key("all other files of the package")
+    format: str = PACKAGE.format
+
+
+# ---- the truth
+
+
+class TrueTank(Saved):
+    """A tank as it is, and its assigned values."""
+
+    tank: str = key("name")
+    family: str = key("of its defects")
+    heights_m: list[Finite] = key("as asked")
+    volume_m3: list[Finite] = key("assigned values")
+    numerical_error_m3: Finite = key("the largest change of them by more nodes of the quadrature")
+    shape: dict = key("the tank itself, from which the volumes can be computed again")
+
+
+class TruthFile(Saved):
+    """What stays sealed until all answers are in."""
+
+    tankcal: str = key("version that made it")
+    nonce: str = key("256 random bits, so that the hash of the file cannot be found by trying")
+    secret: str = key('256 random bits that the draws hang on beside the seed; "": by the seed')
+    seed: int = key("of the draws")
+    methods: list[str] = key("by which each tank was surveyed")
+    tanks: list[TrueTank] = key("all of them")
+    format: str = TRUTH.format
+
+
+# ---- answers
+
+
+class Participant(Saved):
+    """Who answers, with what."""
+
+    name: str = key("of the participant")
+    software: str = key("that computed the answers")
+    version: str = key("of the software")
+    date: str | None = key("of the answers, year-month-day; null: not said")
+    contact: str | None = key("null: not said")
+    remarks: str | None = key("null: none")
+    package: str = key("truth_sha256 of the package's manifest.json")
+
+
+class Answer(Saved):
+    """The table of one survey."""
+
+    tank: str = key("name")
+    method: str = key("name")
+    height_m: list[Finite] = key("above the dip plate, of those that are asked")
+    volume_m3: list[Finite] = key("below them")
+    U_m3: list[float] = key("expanded uncertainties; null: none is stated")
+    k: list[float] = key("coverage factors; null: not stated")
+
+
+class AnswersFile(Saved):
+    """All answers of a participant."""
+
+    participant: Participant = key("who")
+    answers: list[Answer] = key("one for each survey that is answered")
+    format: str = ANSWERS.format
+
+
+# ---- scores
+
+
+class ScoredRows(Saved):
+    """Errors of one table, row by row."""
+
+    height_m: list[Finite] = key("above the dip plate")
+    true_m3: list[Finite] = key("assigned values")
+    error_m3: list[Finite] = key("answer less assigned value")
+    U_m3: list[float] = key("as stated; null: none")
+    E_n: list[float] = key("null: no U")
+    zeta: list[float] = key("null: no U, or no k")
+
+
+class TableForm(Saved):
+    """What the errors of a table do along its height."""
+
+    falling_rows: int = key("pairs of rows between which the volume does not rise")
+    zero_m3: float | None = key("of the line a + b V through the errors; null: fewer than 4 rows")
+    scale_ppm: float | None = key("b of that line")
+    form_ppm: float | None = key("rms of what that line leaves, of the largest volume asked")
+    delivery_1cm_percent: float | None = key("rms error of deliveries of 1 cm; null: none")
+    delivery_10cm_percent: float | None = key("rms error of deliveries of 10 cm; null: none")
+    delivery_2m_ppm: float | None = key("rms error of deliveries of 2 m; null: none")
+    worst_2m_ppm: float | None = key("the largest of them, with its sign; null: none")
+
+
+class ScoredTable(Saved):
+    """One table of one participant."""
+
+    participant: int = key("place in `participants`, 0 first")
+    tank: str = key("name")
+    method: str = key("name")
+    rows: ScoredRows = key("row by row")
+    missing: int = key("heights that were asked and not answered")
+    top_error_ppm: float | None = key("at the largest height asked; null: not answered")
+    top_E_n: float | None = key("there; null: no U")
+    rms_ppm: Finite = key("rms error of the rows, of the largest volume asked")
+    within: int = key("rows with |E_n| up to 1")
+    judged: int = key("rows with an E_n")
+    mean_U_ppm: float | None = key("of the largest volume asked; null: no U")
+    rms_zeta: float | None = key("rms error over standard uncertainty; null: no k")
+    form: TableForm = key("along the height")
+
+
+class MethodScore(Saved):
+    """All tables of one participant by one method."""
+
+    participant: int = key("place in `participants`, 0 first")
+    method: str = key("name; *: all methods")
+    tables: int = key("answered")
+    asked: int = key("surveys")
+    bias_ppm: float | None = key("mean error at the top")
+    u_bias_ppm: float | None = key("its standard deviation; null: fewer than 2 tables")
+    rms_top_ppm: float | None = key("rms error at the top")
+    rms_ppm: Finite = key("rms error of all rows")
+    mean_U_ppm: float | None = key("null: no U")
+    share_within: float | None = key("of rows, with |E_n| up to 1; null: no U")
+    u_share: float | None = key("its standard deviation, tables counted as the independent units")
+    tops_within: int = key("tables whose |E_n| at the top is up to 1")
+    tops_judged: int = key("tables with an E_n at the top")
+    tops_low: float | None = key("exact 95 % bounds of the probability behind them (binomial)")
+    tops_high: float | None = key("the upper one")
+    rms_zeta: float | None = key("1 where standard uncertainties are right; null: no k")
+    form_ppm: float | None = key("rms of the tables' form_ppm")
+    delivery_1cm_percent: float | None = key("rms")
+    delivery_10cm_percent: float | None = key("rms")
+    delivery_2m_ppm: float | None = key("rms")
+    falling_rows: int = key("of all tables")
+
+
+class ScoresFile(Saved):
+    """What a scorer says of all participants."""
+
+    tankcal: str = key("version that scored")
+    truth_sha256: str = key("of the truth, as committed and as opened")
+    coverage_probability: Finite = key("that was asked for")
+    participants: list[Participant] = key("as they say")
+    tables: list[ScoredTable] = key("every table")
+    methods: list[MethodScore] = key("by participant and method")
+    warnings: list[WarningRecord] = key("of the answers")
+    format: str = SCORES.format
+
+
+def plain_of(saved):
+    """Any of these files as plain data."""
+    return to_plain(saved)
+
+
+def version():
+    """The version that writes."""
+    return tankcal.__version__
