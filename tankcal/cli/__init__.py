@@ -18,6 +18,7 @@ from tankcal.cli import (
     starting,
     table_reading,
     verifying,
+    workbench,
 )
 from tankcal.cli.help_words import argparse_in, put_in_words
 from tankcal.cli.machine import failure, print_json
@@ -36,6 +37,8 @@ a new tank, step by step:
   (fill in the blanks, in the CSV files or in the workbook)
   tankcal run my-tank           compute it; the results are in my-tank/results
   tankcal run my-tank/job.xlsx  the same, from the workbook
+  tankcal notebook my-tank      fill it in, check and compute it in a notebook (JupyterLab)
+  tankcal app my-tank           the same as a page without code
   tankcal report my-tank/results --language es   the papers again, in Spanish
   tankcal lint table.csv        look for mistakes in any capacity table
   tankcal read-table old.csv --courses courses.csv   radii and head out of a former table
@@ -116,7 +119,7 @@ def _parser():
     commands = parser.add_subparsers(metavar="COMMAND")
 
     tables = (linting, table_reading, comparing, exporting, inspecting, verifying)
-    rooms = (running, reporting, starting, importing, planning, *tables, camera)
+    rooms = (running, reporting, starting, workbench, importing, planning, *tables, camera)
     for room in rooms:
         room.add(commands)
     if words_of_run():
