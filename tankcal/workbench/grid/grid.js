@@ -45,6 +45,8 @@ class Grid {
     this.input = null;
     this.build(el);
     this.take();
+    const first = this.columns.findIndex((one) => one.is_edited);
+    if (first > 0) this.moveTo(0, first);
     const quiet = new AbortController();
     this.stop = () => quiet.abort();
     this.listen(quiet.signal);
