@@ -147,12 +147,12 @@ class Desk:
 
     def show(self, name):
         """The ShownTable of a table, of a list or of the settings ("job")."""
-        return self.reader.show(self.draft, self.check, name, self.every_key.get(name, False))
+        return self.reader.show(self.draft, self.outcome, name, self.every_key.get(name, False))
 
     # ---- checks
 
     @property
-    def check(self):
+    def outcome(self):
         """The Check of the job as it stands here."""
         if self._checked is None:
             self._checked = self.draft.check()
@@ -224,8 +224,8 @@ class Desk:
 
     def begin(self, tell=None, papers=True, on_result=None):
         """Save, and the Run of the job to be started; Refusal: the job cannot be computed."""
-        if not self.check.is_sound:
-            raise Refusal("\n".join(self.reader.line(one) for one in self.check.problems))
+        if not self.outcome.is_sound:
+            raise Refusal("\n".join(self.reader.line(one) for one in self.outcome.problems))
         self.save()
         return Run(self.draft.source, self.out, tell, papers, on_result)
 
@@ -296,7 +296,7 @@ class Desk:
 
     def head_text(self):
         """Which job this is, and whether it is sound, in a few lines."""
-        problems, warnings = len(self.check.problems), len(self.check.warnings)
+        problems, warnings = len(self.outcome.problems), len(self.outcome.warnings)
         word = self.reader.word
         lines = [word("job_is", job=str(self.draft.source.resolve()))]
         lines.append(word("counts", problems=problems, warnings=warnings))
@@ -334,7 +334,7 @@ class TableView:
 
     def _missing(self):
         """Why there is nothing to be shown: what the check says of it, or that it is not there."""
-        reader, check = self.desk.reader, self.desk.check
+        reader, check = self.desk.reader, self.desk.outcome
         title = reader.title(self.name)
         own = [
             (BAD, reader.line(one))
@@ -352,18 +352,18 @@ class Findings:
         self._desk = desk
 
     def __len__(self):
-        return len(self._desk.check.problems)
+        return len(self._desk.outcome.problems)
 
     def __iter__(self):
-        return iter(self._desk.check.problems)
+        return iter(self._desk.outcome.problems)
 
     def __getitem__(self, place):
-        return self._desk.check.problems[place]
+        return self._desk.outcome.problems[place]
 
     @property
     def page(self):
         """As HTML."""
-        check, line = self._desk.check, self._desk.reader.line
+        check, line = self._desk.outcome, self._desk.reader.line
         lines = [(BAD, line(one)) for one in check.problems]
         lines += [(DOUBTFUL, line(one)) for one in check.warnings]
         return list_page(lines, self._desk.reader.word("nothing_wrong"))

@@ -13,7 +13,9 @@ from tankcal.messages import message
 HERE = "127.0.0.1"
 # The page takes nothing from elsewhere, and its kernel's messages go nowhere else: the template of
 # Voilà names a style sheet of another host, which a machine without a network would wait for.
-POLICY = "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob: ws: wss:; frame-ancestors 'self'"
+POLICY = (
+    "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob: ws: wss:; frame-ancestors 'self'"
+)
 
 
 def has_lab():

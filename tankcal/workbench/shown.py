@@ -11,6 +11,7 @@ from tankcal.workbench.findings import BAD
 from tankcal.workbench.keys import NOT_HERE, SETTINGS, field_of
 
 OWNER, KEY, VALUE, UNIT, EXPECTED = "owner", "key", "value", "unit", "expected"
+MOST_CHOICES = 12  # that are said in words
 
 
 @dataclass(frozen=True)
@@ -130,6 +131,8 @@ class Reader:
         )
 
     def _expectation(self, field):
+        if len(field.choices) > MOST_CHOICES:  # codes, such as the inputs of uncertainty
+            return ", ".join(field.choices)
         if field.kind == "choice" or (field.choices and field.kind != "number"):
             return ", ".join(self.texts.choice(one) for one in field.choices)
         return self.say(field.expectation())

@@ -140,7 +140,8 @@ class CsvLines:
 
         if self.heading is None:
             copy_until(None)
-            emit(self.separator.join(map(self._quoted, table.headings)))
+            if table.headings:
+                emit(self.separator.join(map(self._quoted, table.headings)))
         else:
             copy_until(self.heading)
             added = [one for one in table.headings[len(self.before) :] if one]
