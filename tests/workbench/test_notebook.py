@@ -1,4 +1,4 @@
-"""The notebook of a job: what is written, what is kept, and the same papers from it without hands."""
+"""The notebook of a job: what is written, what is kept, and the papers from it without hands."""
 
 import json
 import subprocess
