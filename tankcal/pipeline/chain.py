@@ -1,6 +1,6 @@
 """The main job on one screen: a checked job in; wall, parts and the capacity table out."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from html import escape
@@ -200,7 +200,12 @@ class Result:
         return plot(self, what)
 
     def budget(
-        self, high_m: float | None = None, low_m: float | None = None, *, reading: bool = False
+        self,
+        high_m: float | None = None,
+        low_m: float | None = None,
+        *,
+        reading: bool = False,
+        factors: Sequence[float] | None = None,
     ) -> Budget:
         """What the uncertainty of a volume, or of a delivery, consists of.
 
@@ -210,16 +215,20 @@ class Result:
             Dips, m; without `high_m` the top row, without `low_m` the volume below `high_m`.
         reading : bool
             Whether what reading the table adds (interpolation, rounding) is in it.
+        factors : sequence of float, optional
+            What if the u of each line of this budget were so many times what it is.
 
         Raises
         ------
         HeightError
             For a dip outside the table.
+        ValueError
+            For another number of factors than lines.
         """
         high_m = float(self.table.height_m[-1]) if high_m is None else high_m
         largest_m3 = self.straightness.largest_m3
         added = reading_sources(self.job.inputs, largest_m3) if reading else ()
-        return budget(self.table, high_m, low_m, added)
+        return budget(self.table, high_m, low_m, added, factors)
 
     @property
     def accepted(self) -> np.ndarray | None:
