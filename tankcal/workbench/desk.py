@@ -271,9 +271,10 @@ class Desk:
         import datetime
 
         draft, name = self.draft, "overrulings"
+        columns = ("point", "decision", "reason", "date")
         if name not in draft.tables:
-            draft.add_table(name)
-        for column in ("decision", "reason", "date"):
+            draft.add_table(name, columns)
+        for column in columns:
             draft.add_column(name, column)
         table = draft.tables[name]
         column = table.headings.index("point")

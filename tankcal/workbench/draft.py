@@ -206,10 +206,13 @@ class Draft:
             self._keep()
             self.tables[name] = self.tables[name].add_column(heading)
 
-    def add_table(self, name):
-        """A table that the job did not have, with the columns that it must have, and no row."""
+    def add_table(self, name, headings=None):
+        """A table that the job did not have, without rows.
+
+        headings  None: the columns that it must have
+        """
         needed = [one.name for one in COLUMNS[name] if one.suits(self.kind) and one.required]
-        needed = needed or [one.name for one in columns_of(name, self.kind)]
+        needed = headings or needed or [one.name for one in columns_of(name, self.kind)]
         self._keep()
         if self.is_book:
             self.tables[name] = new_sheet_table(name, needed, self.kind)

@@ -8,7 +8,7 @@ import ipywidgets as widgets
 from tankcal.errors import InputError, TankcalError
 from tankcal.workbench.desk import Refusal
 from tankcal.workbench.grid import Grid
-from tankcal.workbench.result_views import results_view
+from tankcal.workbench.result_views import live_results
 
 PAUSE_S = 0.3  # after an edit, before the job is checked
 
@@ -298,9 +298,7 @@ class ResultsPanel:
     def _show(self, result):
         """The results as soon as they are there, while the papers are being written."""
         self.desk.keep_run(self.run)
-        view = results_view(self.desk)
-        is_widget = isinstance(view, widgets.Widget)
-        self.view.children = (view if is_widget else _page(view._repr_html_()),)
+        self.view.children = (live_results(self.desk),)
 
     async def _finish(self, thread):
         await asyncio.to_thread(thread.join)

@@ -243,6 +243,22 @@ def test_run_saves_and_writes_the_record_of_the_files(folder, tmp_path):
     assert made.is_stale
 
 
+def test_overruling_is_noted_in_the_job(folder, tmp_path):
+    made = open_job(folder, out=tmp_path / "out", live=False)
+    made.run(papers=False)
+    name = made.draft.tables["points"].rows[3].cells[0]
+    made.overrule(name, "leave_out", "a clamp, seen on the photo")
+    made.overrule(name, "leave_out", "a clamp of the ladder, seen on the photo")
+    assert made.is_stale
+    assert made.problems[:] == ()
+    result = made.run(papers=False)
+    lines = (folder / "overrulings.csv").read_text().splitlines()
+    assert lines[0] == "point,decision,reason,date"
+    assert lines[1].startswith(f'{name},leave_out,"a clamp of the ladder, seen on the photo",2')
+    assert len(lines) == 2
+    assert len(result.accepted) == len(result.job.points.names) - 1
+
+
 def test_a_run_can_be_stopped(folder, tmp_path):
     run, heard = Run(folder, tmp_path / "out", papers=False), []
 
