@@ -128,8 +128,7 @@ class _Attempt:
                 body = body_of(found.job, found.survey, uncertain=False)
             else:
                 body = measure_by_liquid(found.job, found.survey).body
-            top = min(level_m, body.highest_m) if level_m <= body.highest_m + 1e-3 else level_m
-            return cls(found, float(body.volume_m3(np.array([top]))[0]))
+            return cls(found, float(body.volume_m3(np.array([level_m]))[0]))
         except (InputError, SolutionError, HeightError):
             return cls(None, np.nan)
 

@@ -28,8 +28,11 @@ _SCRIPTS = {
 }
 
 
-def page(blocks):
-    """The blocks as one HTML page, in the words of their document's language."""
+def page(blocks, has_contents=True):
+    """The blocks as one HTML page, in the words of their document's language.
+
+    has_contents  False: without the list of its headings, as a notebook frames it
+    """
     first = blocks[0]
     language = first["language"] if first["language"] in LANGUAGES else DEFAULT
     words = load_words(language)
@@ -53,7 +56,7 @@ def page(blocks):
             "<body>",
             *_bar(first, blocks, words["web"]),
             '<div class="columns">',
-            contents_html(contents, words["web"]),
+            contents_html(contents, words["web"]) if has_contents else "",
             '<main id="main">',
             *_written(blocks, words["web"]),
             "</main>",

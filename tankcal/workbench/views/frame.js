@@ -5,7 +5,9 @@ export default {
     const frame = document.createElement("iframe");
     frame.setAttribute("sandbox", "allow-scripts");
     frame.title = model.get("title");
-    Object.assign(frame.style, { width: "100%", height: model.get("height"), border: "1px solid #c3cad2" });
+    Object.assign(frame.style, {
+      boxSizing: "border-box", width: "100%", height: model.get("height"), border: "1px solid #c3cad2",
+    });
     const choose = () =>
       frame.contentWindow?.postMessage({ tankcal: "choose", point: model.get("chosen") || null }, "*");
     const hear = (event) => {

@@ -54,14 +54,15 @@ def _page(paper, blocks):
         language=paper.words["language"]["code"],
         notice=str(paper.record["job"]["certificate"].get("notice", "")),
     )
-    return page([one.data for one in (first, *blocks)])
+    return page([one.data for one in (first, *blocks)], has_contents=False)
 
 
 def framed(html, title, height=HEIGHT):
     """A page in a frame, as HTML."""
+    style = f"box-sizing:border-box;width:100%;height:{height};border:1px solid #c3cad2"
     return (
-        f'<iframe sandbox="allow-scripts" title="{escape(title)}" srcdoc="{escape(html)}" '
-        f'style="width:100%;height:{height};border:1px solid #c3cad2"></iframe>'
+        f'<iframe sandbox="allow-scripts" title="{escape(title)}" style="{style}" '
+        f'srcdoc="{escape(html)}"></iframe>'
     )
 
 

@@ -102,7 +102,7 @@ class PointsPanel(traitlets.HasTraits):
         if one.w is not None:
             parts.append(f"w = {self.paper.number(one.w, decimals=1)}")
         if one.azimuth_deg is not None:
-            parts.append(self.paper.number(one.azimuth_deg, "deg", decimals=1))
+            parts.append(f"{self.paper.number(one.azimuth_deg, decimals=1)}°")
             parts.append(self.paper.number(one.height_m, "m", decimals=3))
         return " · ".join(parts)
 
@@ -114,7 +114,7 @@ class PointsPanel(traitlets.HasTraits):
     # ---- deciding
 
     def overrule(self, decision):
-        """Hand over a decision about the point looked at; without a reason it is refused."""
+        """Hand over a decision about the point that is looked at; refused without a reason."""
         word, name = self.paper.word, self.chosen
         reason = " ".join(self.reason.value.split())
         if not reason:

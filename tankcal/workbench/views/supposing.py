@@ -5,6 +5,7 @@ from html import escape
 import ipywidgets as widgets
 
 from tankcal.errors import HeightError
+from tankcal.text.digits import fixed
 from tankcal.text.words import say
 from tankcal.workbench.views.calculating import typed_number
 from tankcal.workbench.views.what_if import sentences, suppose, table_html
@@ -38,10 +39,19 @@ class BudgetPanel:
         self.totals, self.table = widgets.HTML(), widgets.HTML()
         for one in (self.dip, self.low, *self.factors):
             one.observe(self.show, "value")
-        lines = [widgets.HBox([one, self._half(one)]) for one in self.factors]
+        lines = [widgets.HBox([one, self._readout(one), self._half(one)]) for one in self.factors]
         heading = widgets.HTML(f"<b>{escape(word('views.what_if'))}</b>")
+        reset = widgets.HBox([self.reset])
         self.box = widgets.VBox(
-            [self.dip, self.low, self.totals, heading, *lines, self.reset, self.table]
+            [
+                self.dip,
+                self.low,
+                self.totals,
+                heading,
+                *lines,
+                reset,
+                self.table,
+            ]
         )
         self.show()
 
@@ -53,9 +63,20 @@ class BudgetPanel:
             step=STEP,
             description=name,
             continuous_update=False,
+            readout=False,  # it knows the decimal point alone
             style={"description_width": "24rem"},
-            layout={"width": "48rem"},
+            layout={"width": "44rem"},
         )
+
+    def _readout(self, slider):
+        label = widgets.Label(layout={"width": "3rem"})
+
+        def show(_change=None):
+            label.value = fixed(slider.value, 2, self.paper.marks)
+
+        slider.observe(show, "value")
+        show()
+        return label
 
     def _half(self, slider):
         button = widgets.Button(
