@@ -51,6 +51,7 @@ def serve_app(notebook, port, address=HERE, is_browser=True, token=""):
     token : str
         That a visitor must bring; "": none.
     """
+    from traitlets.config import Config
     from voila.app import Voila
 
     _let_kernels_start_quickly()
@@ -61,9 +62,10 @@ def serve_app(notebook, port, address=HERE, is_browser=True, token=""):
         f"--Voila.open_browser={bool(is_browser)}",
         f"--token={token}",
         "--strip_sources=True",
-        f"--Voila.tornado_settings={ {'headers': {'Content-Security-Policy': POLICY}} }",
     ]
-    Voila.launch_instance(given)
+    headers = {"Content-Security-Policy": POLICY}
+    settings = Config({"Voila": {"tornado_settings": {"headers": headers}}})
+    Voila.launch_instance(given, config=settings)
 
 
 def is_local(address):
