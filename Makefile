@@ -94,7 +94,7 @@ $(VENV)/base: pyproject.toml constraints.txt
 	touch $@
 
 $(VENV)/full: $(VENV)/base
-	$(BIN)/pip install --quiet --editable '.[test,check,images,clouds,cluster]'
+	$(BIN)/pip install --quiet --editable '.[test,check,images,clouds,cluster,lab,app]'
 	touch $@
 
 $(VENV)/release: $(VENV)/full

@@ -21,6 +21,7 @@ from tankcal.gum.components import (
     declared_source,
     factor_of,
     group_correlated,
+    scale_source,
     together_dof,
     triangular,
 )
@@ -48,6 +49,7 @@ __all__ = [
     "group_correlated",
     "least_of",
     "propagate",
+    "scale_source",
     "sensitivities_of",
     "sum_of_fourths",
     "together_dof",

@@ -33,6 +33,7 @@ OPTIONS = (
     "--disable-extensions",
     "--window-size=1300,900",
 )
+THIS_MACHINE = "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"  # an option
 PATIENCE_S = 60
 
 
@@ -111,6 +112,53 @@ class Browser:
         while self.run("document.readyState") != "complete":
             assert time.monotonic() < deadline, f"{path} was not loaded"
         self.drawn()
+
+    def visit(self, url):
+        """Load a page of a server of this machine."""
+        self.events.clear()
+        self.ask("Page.navigate", url=url)
+
+    def wait_for(self, script, seconds=PATIENCE_S):
+        """The value of an expression as soon as it is true; what it asks for may not be there."""
+        deadline = time.monotonic() + seconds
+        while True:
+            found = self.run(
+                f"(() => {{ try {{ const found = {script}; "
+                "return found instanceof Node ? true : found } catch (e) { return null } })()"
+            )
+            if found:
+                return found
+            assert time.monotonic() < deadline, f"not within {seconds} s: {script}"
+            time.sleep(0.05)
+
+    def click(self, selector):
+        """Press the mouse in the middle of an element."""
+        element = f"document.querySelector({json.dumps(selector)})"
+        self.run(f"{element}.scrollIntoView({{block: 'center', inline: 'nearest'}})")
+        self.drawn()
+        x, y = self.run(
+            f"(({{x, y, width, height}}) => [x + width / 2, y + height / 2])"
+            f"({element}.getBoundingClientRect())"
+        )
+        where = {"x": x, "y": y, "button": "left", "clickCount": 1}
+        for kind in ("mousePressed", "mouseReleased"):
+            self.ask("Input.dispatchMouseEvent", type=kind, **where)
+        self.drawn()
+
+    def write(self, text):
+        """Type a text, key by key, into what has the focus."""
+        for char in text:
+            self.ask("Input.dispatchKeyEvent", type="keyDown", key=char, text=char)
+            self.ask("Input.dispatchKeyEvent", type="keyUp", key=char)
+
+    def paste(self, selector, text):
+        """Paste a text into an element, as the clipboard of another program holds it."""
+        self.run(
+            f"(() => {{ const data = new DataTransfer(); data.setData('text/plain', "
+            f"{json.dumps(text)}); document.querySelector({json.dumps(selector)}).dispatchEvent("
+            "new ClipboardEvent('paste', {clipboardData: data, bubbles: true, cancelable: true}));"
+            " return 1 })()"
+        )
 
     def drawn(self):
         """Wait for two frames, so that everything that changed is on the screen."""

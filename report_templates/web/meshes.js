@@ -56,6 +56,15 @@ function pointVertices(shell) {
   return new Float32Array(vertices);
 }
 
+/** The rejected points of a shell, at most so far off that they stay in the picture. */
+function rejectedVertices(shell) {
+  const vertices = shell.rejected.flatMap(({ azimuth, height, off_m }) => {
+    const turn = (Math.PI * azimuth) / 180;
+    return [Math.sin(turn), Math.cos(turn), height, off_m, off_m];
+  });
+  return new Float32Array(vertices);
+}
+
 /** A disc of radius 1 as a fan, for the level of the liquid; its height is set when drawn. */
 function discVertices(steps = 96) {
   const vertices = [0, 0, 0, 0, 0];

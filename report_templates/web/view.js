@@ -2,6 +2,7 @@
 
 const INK = [0.1, 0.17, 0.24]; // of lines and points, on a wall that is pale in every look
 const NEARER = 5e-4; // lines and points stand before the wall, part of the depth
+const [REJECTED, CHOSEN] = [[0.05, 0.05, 0.05, 1], [0.85, 0.4, 0, 0.9]];
 const STEEL = [0.66, 0.71, 0.76, 1]; // of a tank without deviations
 
 {
@@ -32,12 +33,14 @@ function runView(box, { shell, solid }, scene) {
   const parts = {
     wall: scene.uploaded(tank.vertices, tank.triangles),
     points: points && scene.uploaded(points),
+    rejected: shell?.rejected.length ? scene.uploaded(rejectedVertices(shell)) : null,
     disc: scene.uploaded(discVertices()),
   };
   const extent = extentOf(tank.vertices, shell?.radius_m ?? 1);
   const controls = shell ? deviationControls(box, shell, tank.vertices, () => draw()) : null;
   const labels = labelsOf(box, shell, points);
   let level = null;
+  let chosen = -1; // number of the rejected point that is looked at
   let waiting = false;
 
   const drawNow = () => {
@@ -57,6 +60,14 @@ function runView(box, { shell, solid }, scene) {
       const size = 5 * Math.min(window.devicePixelRatio || 1, 2);
       scene.draw(parts.points, gl.POINTS, { ...common, limit: 0, nearer: 2 * NEARER, wide: size }, [...INK, 1]);
     }
+    if (parts.rejected) {
+      const size = 7 * Math.min(window.devicePixelRatio || 1, 2);
+      const bare = { ...common, limit: 0, nearer: 3 * NEARER };
+      scene.draw(parts.rejected, gl.POINTS, { ...bare, wide: size }, REJECTED);
+      if (chosen >= 0) {
+        scene.draw(parts.rejected, gl.POINTS, { ...bare, nearer: 1, wide: 2.6 * size }, CHOSEN, [[chosen, 1]]);
+      }
+    }
     if (shell && level !== null) {
       const still = { ...common, exaggeration: 0, limit: 0, lift: level };
       scene.draw(parts.disc, gl.TRIANGLE_FAN, still, [0.1, 0.45, 0.7, 0.35]);
@@ -75,6 +86,13 @@ function runView(box, { shell, solid }, scene) {
       draw();
     });
   }
+  whenPointChosen((name) => {
+    chosen = shell ? shell.rejected.findIndex((one) => one.name === name) : -1;
+    if (chosen >= 0) { // from where it is seen
+      camera.yaw = Math.PI + (Math.PI * shell.rejected[chosen].azimuth) / 180;
+    }
+    draw();
+  });
   lookChanged.push(draw);
   new ResizeObserver(draw).observe(canvas);
   draw();

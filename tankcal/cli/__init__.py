@@ -22,6 +22,7 @@ from tankcal.cli import (
     starting,
     table_reading,
     verifying,
+    workbench,
 )
 from tankcal.cli.help_words import argparse_in, put_in_words
 from tankcal.cli.machine import failure, print_json
@@ -40,6 +41,8 @@ a new tank, step by step:
   (fill in the blanks, in the CSV files or in the workbook)
   tankcal run my-tank           compute it; the results are in my-tank/results
   tankcal run my-tank/job.xlsx  the same, from the workbook
+  tankcal notebook my-tank      fill it in, check and compute it in a notebook (JupyterLab)
+  tankcal app my-tank           the same as a page without code
   tankcal report my-tank/results --language es   the papers again, in Spanish
   tankcal lint table.csv        look for mistakes in any capacity table
   tankcal read-table old.csv --courses courses.csv   radii and head out of a former table
@@ -139,7 +142,7 @@ def _parser_in_english():
 
     tables = (linting, table_reading, comparing, history, exporting, inspecting, verifying)
     others = (camera, intercomparison)
-    for room in (running, reporting, starting, importing, planning, *tables, *others):
+    for room in (running, reporting, starting, workbench, importing, planning, *tables, *others):
         room.add(commands)
     pages.add(commands)
     completing.add(commands, _parser_in_english)

@@ -20,6 +20,7 @@ from tankcal.cli.showing import (
 )
 from tankcal.errors import Problem, SolutionError
 from tankcal.messages import message
+from tankcal.report.folders import default_folder
 from tankcal.text.digits import decimals_of_height, fixed, format_significant, format_with_u
 
 DECIMALS_WITHOUT_U = 3  # of a volume in m3: litres
@@ -92,18 +93,12 @@ def _add_run(commands):
 
 def _run(options):
     source = Path(options.job)
-    out = Path(options.out) if options.out else _default_out(source)
+    out = Path(options.out) if options.out else default_folder(source)
     compute = partial(_adjust if options.only == "adjustment" else _compute, options.cluster)
     tell = _tell_machine if options.machine else _tell
     quiet = options.quiet or options.machine
     papers = letterhead_of(options), not options.no_papers
     compute(source, out, quiet, options.strict, papers, tell)
-
-
-def _default_out(source):
-    if source.suffix.lower() == ".xlsx":
-        return source.with_name(f"{source.stem}-results")
-    return (source.parent if source.name == "job.toml" else source) / "results"
 
 
 def _demo(options):

@@ -10,10 +10,10 @@ from pathlib import Path
 from tankcal.errors import InputError
 from tankcal.messages import Message, message
 from tankcal.text.languages import DEFAULT, nearest_language
+from tankcal.text.time_left import how_far
 
 RECORD = "record.json"
 _LOCALE = ("LC_ALL", "LC_MESSAGES", "LANG")  # the first that is set counts
-JUDGED_S, MILLION = 2.0, 1_000_000  # of a step, before the time left is told
 TO_THE_END = "\x1b[K"  # a terminal clears the rest of the line
 _spoken = {}  # the words of the language that is spoken; nothing: English as it was made
 
@@ -125,30 +125,6 @@ def print_paths(out, paths):
     say(message("results_in", "results in {folder}:", folder=str(out)))
     for path in paths:
         print(f"  {path}")
-
-
-def how_far(done, total, fresh, seconds):
-    """How much of a long step is done, and how long it will still take; of millions, their rate.
-
-    fresh  of `done`, what was done within so many seconds
-    """
-    left = ""
-    if seconds >= JUDGED_S and fresh > 0 and done < total:
-        rest = (total - done) * seconds / fresh
-        if rest < 100:
-            left = message("part_seconds_left", ", about {count:.0f} s left", count=rest)
-        else:
-            left = message("part_minutes_left", ", about {count:.0f} min left", count=rest / 60)
-    if total < MILLION:
-        return message("part_done", "{done}/{total}{left}", done=done, total=total, left=left)
-    return message(
-        "part_millions_done",
-        "{done:.1f}/{total:.1f} million, {rate:.1f} million/s{left}",
-        done=done / MILLION,
-        total=total / MILLION,
-        rate=fresh / MILLION / max(seconds, 1e-3),
-        left=left,
-    )
 
 
 class Progress:

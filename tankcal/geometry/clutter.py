@@ -35,14 +35,16 @@ class Wall:
     noise_dof: float
 
 
-def find_form(local, course, zeta, candidates, axis, relative, slope_sd, least_m):
+def find_form(local, course, zeta, candidates, axis, relative, slope_sd, least_m, kept=None):
     """The `Wall`: points about the smooth form of a shell, without those that deny it.
 
     A pass rejects the points within a tenth of the worst and fits anew. When none is left to
     reject, rejected points that agree with the fit after all come back, each once. A point that
-    departs by less than `least_m` stays; None: all do.
+    departs by less than `least_m` stays; None: all do. So do those that are `kept` (n,), which bend
+    the form no more than any doubtful point does.
     """
     index = np.flatnonzero(candidates)
+    stays = np.zeros(len(index), dtype=bool) if kept is None else kept[index]
     xyz, of, relative = local[index], course[index], relative[index]
     uneven = unevenness(xyz, of, zeta[index], axis)
     thin = _thinned(xyz, of, axis)
@@ -54,8 +56,8 @@ def find_form(local, course, zeta, candidates, axis, relative, slope_sd, least_m
     def refit(before, goes, comes):
         return fitted(before.accepted & ~goes | comes, before)
 
-    def tests(fit):
-        far = np.abs(fit.residual) > least_m
+    def tests(fit, stays=stays[thin]):
+        far = (np.abs(fit.residual) > least_m) & ~stays
         return fit.accepted, np.where(far, np.abs(fit.w), 0.0), CRITICAL
 
     fit = fitted(np.ones(len(thin), dtype=bool), None)
@@ -63,7 +65,7 @@ def find_form(local, course, zeta, candidates, axis, relative, slope_sd, least_m
         fit = snoop(fit, tests, refit, at_once=0.9, returns=1).adjustment
     everywhere = _predicted(fit, thin, xyz, of, uneven, relative)
     if least_m is not None:
-        _, statistic, critical = tests(everywhere)
+        _, statistic, critical = tests(everywhere, stays)
         rest = np.ones(len(index), dtype=bool)
         rest[thin] = False
         everywhere.accepted[rest] = statistic[rest] <= critical

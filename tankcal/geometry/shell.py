@@ -37,6 +37,7 @@ WIDEST_SLOPE = 0.05  # sd of the slope before anything is measured: tanks hardly
 NEAR_M = 0.3  # from the wall: what stands there may be told by its side alone
 VAGUE_TILT = 2e-3  # sd above which the tilt counts as not determined by the points
 UNDECIDED = "undecided"  # reason of a point that may be of the wall or of a fitting before it
+OVERRULED = "overruled"  # reason of a point that somebody took out before the search
 
 
 @dataclass(frozen=True)
@@ -131,7 +132,9 @@ def course_of(z_m, joints_m):
     return np.searchsorted(np.asarray(joints_m)[1:-1], z_m, side="right")
 
 
-def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, welds_rad=()):
+def find_shell(
+    xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, welds_rad=(), decided=None
+):
     """Tell the wall from the clutter and find the axis of the shell.
 
     Parameters
@@ -148,6 +151,10 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
         Whether points are tested by data snooping.
     welds_rad : sequence of array_like, optional
         Azimuths of the vertical welds of each course; (): not known.
+    decided : ndarray of int, shape (n,), optional
+        1 of points that somebody knows to be of the wall: none of the tests takes one out, but what
+        it shows counts as that of any other, also for how rough the wall is. -1 of points that take
+        no part; None: all are left to the search.
 
     Returns
     -------
@@ -160,7 +167,9 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
         the top.
     """
     xyz_m = np.asarray(xyz_m, dtype=float)
-    reason = _reasons(xyz_m, joints_m)
+    decided = np.zeros(len(xyz_m), dtype=int) if decided is None else decided
+    reason, kept = _reasons(xyz_m, joints_m), decided > 0
+    reason[decided < 0] = OVERRULED
     candidates = reason == ""
     course = course_of(xyz_m[:, 2], joints_m)
     origin = np.array([*np.median(xyz_m[:, :2], axis=0), (joints_m[0] + joints_m[-1]) / 2])
@@ -168,23 +177,26 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
 
     start = consensus_circle(local[candidates, :2], nominal_radius_m)
     wall, axis = _leaning_cylinder(local, course, candidates, start, nominal_radius_m)
+    wall |= kept & candidates
     reason[candidates & ~wall] = "consensus"
     believed = np.ones(len(xyz_m)) if sd_m is None else np.maximum(sd_m, LEAST_NOISE_M)
     relative = believed / np.median(believed)
     zeta = _within_course(xyz_m[:, 2], course, np.asarray(joints_m, dtype=float))
     least = BELIEVED_M if snooping else None
-    found = find_form(local, course, zeta, wall, axis, relative, WIDEST_SLOPE, least)
+    band = (local, course, zeta, wall)
+    found = find_form(*band, axis, relative, WIDEST_SLOPE, least, kept)
     tilt_known = np.sqrt(np.diag(found.slope_cofactor).max()) < VAGUE_TILT
     if not tilt_known:
         upright = np.array([*axis[:2], 0.0, 0.0])
-        found = find_form(local, course, zeta, wall, upright, relative, 1e-9, least)
+        found = find_form(*band, upright, relative, 1e-9, least, kept)
     in_band, axis, column = wall, found.axis, np.full(len(xyz_m), NONE)
     w, residual, wall, sizes = found.w, found.residual.copy(), found.wall, None
     if snooping:
         seams = _seams(local, course, candidates, in_band, found, nominal_radius_m)
         wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
         where, of_wall = (local, course, zeta), (axis, relative, nominal_radius_m, welds_rad)
-        tested, stands = _by_field(*where, in_band, wall, (seams, found.noise), *of_wall)
+        sure = seams | (kept & in_band)
+        tested, stands = _by_field(*where, in_band, wall, kept, (sure, found.noise), *of_wall)
         wall[in_band], w[in_band], residual[in_band] = tested.accepted, tested.w, tested.departure_m
         wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
         wall[np.flatnonzero(in_band)[stands]] = False
@@ -222,11 +234,14 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
     )
 
 
-def _by_field(local, course, zeta, in_band, wall, shown, axis, relative, nominal_m, welds_rad):
+def _by_field(
+    local, course, zeta, in_band, wall, kept, shown, axis, relative, nominal_m, welds_rad
+):
     """`Tested` of the points near the wall: each by the field that the accepted others show; and
     which of them are columns that no wall is likely to have.
 
-    shown  what the smooth form showed: (n,) points of seams, and the scatter about it
+    kept   (n,) points that stay, whatever the others say
+    shown  (n,) points of seams, which the smooth form showed, and kept ones; the scatter about it
     """
     index = np.flatnonzero(in_band)
     offset, distance = distances_from_axis(local[index], axis)
@@ -236,10 +251,11 @@ def _by_field(local, course, zeta, in_band, wall, shown, axis, relative, nominal
     ring, leans = find_rings(courses, zeta[index], azimuth)
     sites = Sites(courses, ring, zeta[index], azimuth, leans, welds)
     given = sites, distance, relative[index] ** 2, nominal_m
-    tested = find_blunders(*given, wall[index])
+    may_go = ~kept[index]
+    tested = find_blunders(*given, wall[index], may_go=may_go)
     stands = find_uprights(*given, tested, shown[0][index], shown[1])
     if stands.any():
-        tested = find_blunders(*given, tested.accepted, stands)
+        tested = find_blunders(*given, tested.accepted, stands, may_go)
     return tested, stands
 
 

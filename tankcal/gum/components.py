@@ -83,6 +83,38 @@ class Source:
         return self.mapped(lambda columns: weights @ columns)
 
 
+def scale_source(source, factors):
+    """A cause of which each u is so many times what it is; degrees of freedom stay.
+
+    Parameters
+    ----------
+    source : Source
+    factors : sequence of float
+        One, or of correlated inputs one for each part: their correlation stays, too.
+
+    Returns
+    -------
+    Source
+
+    Examples
+    --------
+    Of two inputs with r = 1 that bring 3 and 4, the second one halved:
+
+    >>> a, b = Source("a", np.array([[3.0]])), Source("b", np.array([[4.0]]))
+    >>> (both,) = group_correlated({"a": a, "b": b}, [("a", "b", 1.0)])
+    >>> round(float(np.sum(scale_source(both, [1.0, 0.5]).columns_m3**2)), 12)
+    25.0
+    """
+    if not source.parts:
+        (factor,) = factors
+        u = None if source.u is None else factor * source.u
+        return replace(source, columns_m3=factor * source.columns_m3, u=u)
+    pairs = zip(source.parts, factors, strict=True)
+    parts = tuple(scale_source(part, [factor]) for part, factor in pairs)
+    columns = np.hstack([part.columns_m3 for part in parts]) @ triangular(source.correlation)
+    return replace(source, columns_m3=columns, parts=parts)
+
+
 def declared_source(one, derivative, estimate=None):
     """The `Source` of a declared input.
 

@@ -20,6 +20,7 @@ from tankcal.job.hits import make_hits
 from tankcal.job.lines import make_lines
 from tankcal.job.liquid import make_metering
 from tankcal.job.measuring import make_measurements
+from tankcal.job.overrulings import make_overrulings
 from tankcal.job.radii import make_radii
 from tankcal.job.rule_files import find_rule
 from tankcal.job.strapping import make_strapping
@@ -58,8 +59,10 @@ def job_of(raw, log, is_whole=True):
     measurements = None
     if has_survey(tables):
         measurements = make_measurements(values, tables, registers)
+    overrulings = make_overrulings(tables["overrulings"])
     if not is_whole:
-        return make_frame(raw, values, tables, measurements, tuple(log.warnings))
+        frame = make_frame(raw, values, tables, measurements, tuple(log.warnings))
+        return replace(frame, overrulings=overrulings)
     strapping = make_strapping(values, tables, registers)
     made = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
     lines, hits = make_lines(tables, registers), make_hits(tables, registers)
@@ -78,6 +81,7 @@ def job_of(raw, log, is_whole=True):
         radii=radii,
         change=change,
         great_circles=make_great_circles(tables, registers),
+        overrulings=overrulings,
     )
 
 

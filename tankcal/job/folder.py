@@ -35,14 +35,18 @@ _DECIMAL_COMMA = re.compile(
 )
 
 
-def read_folder(folder, log):
-    """RawJob of a job folder (a Path); what is wrong goes to `log`."""
-    names = _names_in(folder, log)
+def read_folder(folder, log, edited=None):
+    """RawJob of a job folder (a Path); what is wrong goes to `log`.
+
+    edited  {name: bytes} of files that stand in place of those of the folder, or beside them
+    """
+    edited = edited or {}
+    names = sorted({*_names_in(folder, log), *edited})
     _refuse_unknown_files(names, log)
     files = []
 
     def content(name, limit=MAX_FILE_BYTES):
-        data = read_bytes(folder / name, log, limit)
+        data = edited[name] if name in edited else read_bytes(folder / name, log, limit)
         if data is not None:
             files.append(fingerprint(name, data))
         return data

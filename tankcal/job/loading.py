@@ -46,23 +46,56 @@ def load(path: str | PathLike, only: str | None = None) -> Job:
     """
     if only not in (None, "adjustment"):
         raise ValueError(f"found only = {only!r}; expected 'adjustment'")
+    return _load(path, None, only is None)
+
+
+def load_edited(path: str | PathLike, edited: dict[str, bytes]) -> Job:
+    """The same of a job some of whose files were edited and are not saved yet.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        As `load` takes it.
+    edited : dict of bytes
+        What stands in place of the files of these names, or beside the others of the folder.
+
+    Returns
+    -------
+    Job
+
+    Raises
+    ------
+    InputError
+        As `load` does.
+
+    Examples
+    --------
+    >>> settings = open("examples/silva-1995/job.toml", "rb").read()
+    >>> edited = {"job.toml": settings.replace(b"= 13.0 ", b"= 13.5 ")}
+    >>> load_edited("examples/silva-1995", edited).tank.nominal_diameter_m
+    13.5
+    """
+    return _load(path, edited, True)
+
+
+def _load(path, edited, is_whole):
     log = Log()
-    raw = _read(Path(path), log)
+    raw = _read(Path(path), log, edited)
     if raw is None:
         log.stop_if_problems()
-    return job_of(raw, log, only is None)
+    return job_of(raw, log, is_whole)
 
 
-def _read(path, log):
+def _read(path, log, edited):
     """RawJob, or None after telling `log` what `path` is instead of a job."""
     expected = message("expected_job", "expected a job folder, its job.toml or a workbook (.xlsx)")
     try:
         if path.is_dir():
-            return read_folder(path, log)
+            return read_folder(path, log, edited)
         if path.name == SETTINGS_FILE and path.is_file():
-            return read_folder(path.parent, log)
+            return read_folder(path.parent, log, edited)
         if path.suffix.lower() == ".xlsx" and path.is_file():
-            return read_workbook(path, log)
+            return read_workbook(path, log, edited)
         found = message("not_found", "not found")
         if path.exists():
             suffix = path.suffix

@@ -28,10 +28,13 @@ REMARKS = ("note", "label", "unit", "example")  # columns of settings that are n
 SECTION = "section"
 
 
-def read_workbook(path, log):
-    """RawJob of a workbook (a Path), or None after telling `log` why it cannot be read."""
+def read_workbook(path, log, edited=None):
+    """RawJob of a workbook (a Path), or None after telling `log` why it cannot be read.
+
+    edited  {its name: bytes}, which stand in place of what the file holds
+    """
     log.book = path.name
-    data = read_bytes(path, log, MAX_FILE_BYTES)
+    data = (edited or {}).get(path.name) or read_bytes(path, log, MAX_FILE_BYTES)
     if data is None:
         return None
     try:

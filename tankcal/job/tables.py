@@ -34,8 +34,10 @@ CLOUD_TABLES = ("scan_targets",)
 LIQUID_TABLES = ("liquid",)
 RADII_TABLES = ("radii",)
 RING_TABLES = ("rings",)
+OVERRULING_TABLES = ("overrulings",)
 TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + CLOUD_TABLES
 TABLES += LIQUID_TABLES + RADII_TABLES + RING_TABLES + SPHERE_TABLES + SURVEY_TABLES
+TABLES += OVERRULING_TABLES
 REGISTERS = {  # what each lists
     "cameras": "camera",
     "instruments": "instrument",

@@ -1,6 +1,6 @@
 """The main job on one screen: a checked job in; wall, parts and the capacity table out."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from html import escape
@@ -24,6 +24,7 @@ from tankcal.pipeline.liquid_checks import check_liquid_result
 from tankcal.pipeline.liquid_geometry import filled_with
 from tankcal.pipeline.liquid_result import LiquidResult
 from tankcal.pipeline.nominal_wall import NominalWall
+from tankcal.pipeline.overruling import Overrulings, effect_of, warn_of_overrulings
 from tankcal.pipeline.radii_wall import RadiiWall
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.ringed_wall import RingedWall
@@ -43,13 +44,13 @@ from tankcal.pipeline.statements import (
 from tankcal.pipeline.strapped_sphere import StrappedSphere
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.survey_warnings import incomplete_certificate, open_questions
-from tankcal.pipeline.surveying import find_survey, placed
+from tankcal.pipeline.surveying import adjust_decided, find_survey, placed
 from tankcal.pipeline.table import check_table, compute_table
 from tankcal.pipeline.tanks import body_of, shell_volume
 from tankcal.pipeline.views import plot
 from tankcal.pipeline.wall import Wall
 from tankcal.pipeline.wall_straps import Straps
-from tankcal.survey import Adjustment, adjust_survey
+from tankcal.survey import Adjustment
 from tankcal.survey.sighting import Sighting
 from tankcal.survey.tangents import Touching
 from tankcal.tank import dips
@@ -131,6 +132,8 @@ class Result:
         What a sound survey of a sound tank hardly has.
     adjustment : survey.Adjustment or None
         The adjusted survey; None where points were handed in.
+    overrulings : overruling.Overrulings or None
+        What was decided against the search for blunders, and what that changed.
 
     Examples
     --------
@@ -166,6 +169,7 @@ class Result:
     rings: RingedWall | None = None
     ship: ShipTables | None = None
     circles: StrappedSphere | None = None
+    overrulings: Overrulings | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -196,7 +200,12 @@ class Result:
         return plot(self, what)
 
     def budget(
-        self, high_m: float | None = None, low_m: float | None = None, *, reading: bool = False
+        self,
+        high_m: float | None = None,
+        low_m: float | None = None,
+        *,
+        reading: bool = False,
+        factors: Sequence[float] | None = None,
     ) -> Budget:
         """What the uncertainty of a volume, or of a delivery, consists of.
 
@@ -206,16 +215,20 @@ class Result:
             Dips, m; without `high_m` the top row, without `low_m` the volume below `high_m`.
         reading : bool
             Whether what reading the table adds (interpolation, rounding) is in it.
+        factors : sequence of float, optional
+            What if the u of each line of this budget were so many times what it is.
 
         Raises
         ------
         HeightError
             For a dip outside the table.
+        ValueError
+            For another number of factors than lines.
         """
         high_m = float(self.table.height_m[-1]) if high_m is None else high_m
         largest_m3 = self.straightness.largest_m3
         added = reading_sources(self.job.inputs, largest_m3) if reading else ()
-        return budget(self.table, high_m, low_m, added)
+        return budget(self.table, high_m, low_m, added, factors)
 
     @property
     def accepted(self) -> np.ndarray | None:
@@ -376,7 +389,7 @@ def _run(job, progress, part_progress, simulated, reading):
                 message("no_tank", "the job has no tank: only its survey can be adjusted"),
             )
         )
-    found = find_survey(job, progress, reading=reading)
+    given, found = job, find_survey(job, progress, reading=reading)
     job, survey, adjustment = found.job, found.survey, found.adjustment
     radii = survey if isinstance(survey, RadiiWall) else None
     measured_wall = survey if radii is None else radii.surveyed
@@ -386,6 +399,8 @@ def _run(job, progress, part_progress, simulated, reading):
         measured = measure_by_liquid(job, survey)
     made = compute_table(job, survey, progress, measured and measured.body)
     body, zero, table = made.body, made.zero_m, made.table
+    top = float(table.volume_m3[-1]), float(made.levels_m[-1])
+    overruled = effect_of(given, found, *top, progress)
     progress(message("stating", "stating volumes and deliveries"))
     stated = statements(job, table, made.straightness.largest_m3)
     simulation = None
@@ -422,6 +437,7 @@ def _run(job, progress, part_progress, simulated, reading):
             survey,
             made,
             liquid,
+            overruled,
         ),
         adjustment=adjustment,
         strapped=measured_wall if isinstance(measured_wall, StrappedWall) else None,
@@ -434,10 +450,11 @@ def _run(job, progress, part_progress, simulated, reading):
         rings=survey if isinstance(survey, RingedWall) else None,
         ship=ship,
         circles=survey if isinstance(survey, StrappedSphere) else None,
+        overrulings=overruled,
     )
 
 
-def _warnings(job, adjustment, sighting, survey, made, liquid):
+def _warnings(job, adjustment, sighting, survey, made, liquid, overruled):
     of_survey = ()
     if adjustment is not None:
         left_open = open_questions(job, adjustment.datum, adjustment.causes)
@@ -445,6 +462,7 @@ def _warnings(job, adjustment, sighting, survey, made, liquid):
     warnings = (
         *job.warnings,
         *of_survey,
+        *warn_of_overrulings(job, overruled),
         *check_table(job, survey, made, sighting),
         *check_liquid_result(job, liquid),
         *incomplete_certificate(job),
@@ -502,7 +520,7 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> Adjus
             )
         )
     with _telling(job):
-        adjustment = adjust_survey(job.measurements, progress or (lambda text: None))
+        adjustment = adjust_decided(job, progress or (lambda text: None))
     warnings = (*adjustment.warnings, *check_bases(job.measurements))
     return replace(adjustment, warnings=placed(job, warnings))
 

@@ -1,6 +1,7 @@
 """A scanned lying cylinder or sphere: the shape that its points have, and the wall about it."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from tankcal.geometry.cylinders import FittedCylinder, lying_cylinder
 from tankcal.geometry.primitives import fit_sphere
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import refuse_misfit
+from tankcal.pipeline.overruled_points import decisions_of, refuse_kept
 from tankcal.pipeline.scanned_wall import SCALE_OF_MEDIAN, Fitted, agreeing, offsets, scanned_wall
 from tankcal.pipeline.survey_warnings import origin_of
 from tankcal.sections import covariance_of
@@ -17,6 +19,7 @@ from tankcal.tank.surveyed_form import SurveyedForm
 
 FAR = 5.0  # standard deviations: a point further off is not of the wall
 MOST_ROUNDS = 30
+KEPT_PART = 0.03  # of the radius: farther off no point can be kept
 NEVER_PART, NEVER_M = 0.02, 0.01  # of the radius, and more: no point further off is of the wall
 
 
@@ -57,21 +60,26 @@ def fit_scan(job, dof=np.inf):
     changes. Of what is within 2 % of the radius and 10 mm of that shape, all points are then held
     against the wall that the others show (`scanned_wall.agreeing`), so a dent stays in. Without
     snooping every point is used. dof: degrees of freedom of the points' covariance, where it was
-    given. A full covariance is the fit's weight and its propagation. Raises InputError when the
-    points make no such solid.
+    given. A full covariance is the fit's weight and its propagation. Points that somebody decided
+    to keep stay, and those to leave out take no part. Raises InputError when the points make no
+    such solid.
     """
-    chosen = np.ones(len(job.points.names), dtype=bool)
+    decided = decisions_of(job)
+    chosen, kept = decided >= 0, decided > 0
     for _ in range(MOST_ROUNDS):
         fit, names, values, by_shape, residuals = _told(job, chosen)
-        now = _near(residuals, chosen) if job.snooping else chosen
+        now = (_near(residuals, chosen) | kept) & (decided >= 0) if job.snooping else chosen
         if np.array_equal(now, chosen):
             break
         chosen = now
     _refuse_scatter(job, fit, values, residuals[chosen])  # before neighbours make up their own wall
     if job.snooping:
         may_be = chosen | (np.abs(residuals) <= NEVER_PART * fit.radius_m + NEVER_M)
-        chosen = agreeing(job, fit, may_be, lambda index: _covariance(job.points, index), FAR)
+        may_be &= decided >= 0
+        own = partial(_covariance, job.points)
+        chosen = agreeing(job, fit, may_be, own, FAR, kept)
         fit, names, values, by_shape, residuals = _told(job, chosen)
+    refuse_kept(job, residuals, KEPT_PART * fit.radius_m)
     index = np.flatnonzero(chosen)
     noise = _refuse_scatter(job, fit, values, residuals[chosen])
     fitted = Fitted(fit, names, values, by_shape)

@@ -130,12 +130,12 @@ def _field(readings, estimated):
     return SolidField(*given, estimate_sizes(*given, estimate_noise=estimated))
 
 
-def agreeing(job, fit, chosen, covariance_m2, limit):
+def agreeing(job, fit, chosen, covariance_m2, limit, kept):
     """(n,) which of the chosen points agree with the wall that the others show.
 
     One over limit standard deviations off, and deeper than a dent that one point alone may show,
     is left out, the worst first, until none is. Of more points than a field is estimated from,
-    each is held against the median of its neighbours.
+    each is held against the median of its neighbours. Those that are kept (n,) stay.
     """
     index = np.flatnonzero(chosen)
     for _ in range(MOST_ROUNDS):
@@ -144,6 +144,7 @@ def agreeing(job, fit, chosen, covariance_m2, limit):
         else:
             readings = _readings(job, fit, index, covariance_m2(index))
             off = _field(readings, noise_is_estimated(job)).far_off(limit, DENT_M)
+        off = off[~kept[index[off]]]
         if len(off) == 0:
             break
         index = np.delete(index, off)

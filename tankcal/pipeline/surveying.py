@@ -16,6 +16,7 @@ from tankcal.pipeline.cloud_wall import IN_PROCESS, Clouded, find_wall_in_clouds
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
 from tankcal.pipeline.hit_wall import find_hit_wall
 from tankcal.pipeline.nominal_wall import find_nominal_wall
+from tankcal.pipeline.overruled_points import refuse_kept_readings, with_decided_readings
 from tankcal.pipeline.partial_survey import update_by_survey
 from tankcal.pipeline.radii_wall import RadiiWall, find_radii_wall
 from tankcal.pipeline.ringed_wall import find_ringed_wall
@@ -133,8 +134,24 @@ def _adjusted(job, progress):
             "its adjustment",
         )
         raise InputError(Problem("points.csv", expected))
-    adjustment = adjust_survey(job.measurements, progress)
+    adjustment = adjust_decided(job, progress)
     refuse_undetermined(adjustment.datum)
+    return adjustment
+
+
+def adjust_decided(job, progress):
+    """The adjusted survey of a job, its readings overruled as the job says.
+
+    Raises
+    ------
+    InputError
+        For what cannot be meant, and for a kept reading that is not one of the adjustment.
+    SolutionError
+        As `adjust_survey`.
+    """
+    measurements = with_decided_readings(job.measurements, job.overrulings)
+    adjustment = adjust_survey(measurements, progress)
+    refuse_kept_readings(job, adjustment)
     return adjustment
 
 

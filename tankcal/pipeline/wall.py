@@ -12,8 +12,9 @@ from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.outlines import FULL_TURN, polar
-from tankcal.geometry.shell import Shell, course_of, find_shell
+from tankcal.geometry.shell import WIDE_BAND, Shell, course_of, find_shell
 from tankcal.messages import message
+from tankcal.pipeline.overruled_points import decisions_of, refuse_kept
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.survey_warnings import (
@@ -182,9 +183,12 @@ def find_wall(job, progress, dof=np.inf, amplitudes=None):
                 count=len(job.points.names),
             )
         )
-        shell = _shell(job, joints_of(job), radial_sds(job.points))
+        decided = decisions_of(job)
+        shell = _shell(job, joints_of(job), radial_sds(job.points), decided)
         if job.hits is not None or job.tangents is not None:
-            shell = _clear_of_welds(job, shell)
+            shell = _clear_of_welds(job, shell, decided)
+        most = WIDE_BAND * job.tank.nominal_diameter_m / 2
+        refuse_kept(job, shell.residual_m, most, shell.reason)
         progress(
             message(
                 "fitting_sections",
@@ -306,8 +310,10 @@ def _padded(by_points, more):
     return scipy.sparse.vstack([by_points, empty], format="csr")
 
 
-def _clear_of_welds(job, shell):
-    """The shell without the sights beside vertical welds: there the plate is drawn in or out."""
+def _clear_of_welds(job, shell, decided):
+    """The shell without the sights beside vertical welds, where the plate is drawn in or out, but
+    for those that are kept.
+    """
     points, least = job.points, limits_of("wall_hits")["weld_distance_m"]
     every, reason = np.arange(len(points.names)), shell.reason.copy()
     azimuth = _azimuths(job, shell, every)
@@ -315,7 +321,7 @@ def _clear_of_welds(job, shell):
     for index, welds in enumerate(_welds(job)):
         away = np.abs((azimuth[:, None] - welds + np.pi) % FULL_TURN - np.pi)
         near = away.min(axis=1, initial=np.inf) * job.tank.nominal_diameter_m / 2 < least
-        reason[near & (course == index) & (reason == "")] = "weld"
+        reason[near & (course == index) & (reason == "") & (decided <= 0)] = "weld"
     return replace(shell, reason=reason)
 
 
@@ -373,7 +379,7 @@ def _radii_by_points(sections, count):
     return rows[:, place].tocsr()
 
 
-def _shell(job, heights, sds):
+def _shell(job, heights, sds, decided):
     try:
         return find_shell(
             job.points.xyz_m,
@@ -382,6 +388,7 @@ def _shell(job, heights, sds):
             sd_m=sds,
             snooping=job.snooping,
             welds_rad=_welds(job),
+            decided=decided,
         )
     except SolutionError as error:
         if job.hits is not None or job.tangents is not None:

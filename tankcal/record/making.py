@@ -24,6 +24,11 @@ from tankcal.record.great_circles import GreatCirclesRecord, great_circles_of
 from tankcal.record.hits import HitsRecord, hits_of
 from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.liquid import LiquidRecord, liquid_of
+from tankcal.record.overrulings import (
+    OverrulingsRecord,
+    overrulings_of,
+    overrulings_of_adjustment,
+)
 from tankcal.record.plain_data import to_plain
 from tankcal.record.radii import RadiiRecord, radii_of
 from tankcal.record.schema import Saved, filled_from, key
@@ -74,6 +79,11 @@ class Record(Saved, kw_only=True):
     shell: survey.Wall | None = key("the wall as one body", default=None)
     points: list[survey.SurveyedPoint] = key("of an adjusted survey every adjusted point first")
     rejected: list[survey.RejectedPoint] = key("points that are not on the wall", default=())
+    overrulings: OverrulingsRecord | None = key(
+        "decisions against the search for blunders; left out where there are none",
+        default=None,
+        optional=True,
+    )
     sections: list[survey.SectionCircle] = key("from the bottom up", default=())
     strapping: StrappingRecord | None = key(
         "circumferences by tape; left out where there are none", default=None, optional=True
@@ -144,6 +154,7 @@ def record_of(result):
             shell=survey.shell_of(result),
             points=survey.points_of(result),
             rejected=survey.rejected_of(result),
+            overrulings=overrulings_of(result),
             sections=survey.sections_of(result),
             strapping=strapping_of(result),
             lines=lines_of(result),
@@ -186,6 +197,7 @@ def record_of_adjustment(job, adjustment):
         Record(
             **_beginning(job),
             points=survey.points_of_adjustment(adjustment),
+            overrulings=overrulings_of_adjustment(job),
             choices=table.adjustment_choices(adjustment, measurements),
             warnings=texts.warnings_of(dict.fromkeys((*job.warnings, *adjustment.warnings))),
             adjustment=adjustment_of(adjustment, measurements),

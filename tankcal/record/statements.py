@@ -192,10 +192,10 @@ class TableJudged(Saved):
 
 def budget_of(result):
     """The `BudgetLine`s of the top row, by the table alone."""
-    return _lines(budget(result.table, result.table.height_m[-1]).lines)
+    return budget_lines(budget(result.table, result.table.height_m[-1]).lines)
 
 
-def _lines(rows):
+def budget_lines(rows):
     """The `BudgetLine` of each `gum.BudgetRow`."""
     return [
         filled_from(
@@ -278,7 +278,7 @@ def _budget_of(one, asked, judged, interval):
         stated_m3=stated and stated.volume_m3,
         note=stated.note if stated else "",
         monte_carlo=judged and VolumeJudged(**judged),
-        lines=_lines(one.lines),
+        lines=budget_lines(one.lines),
     )
 
 

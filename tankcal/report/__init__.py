@@ -25,6 +25,7 @@ _NOT_IN_ALL = (
     "radii",
     "ship",
     "great_circles",
+    "overrulings",
 )
 _PARTS = (
     ("certificate.pdf", "certificate"),

@@ -20,6 +20,7 @@ WEB_ONLY = (
     "calculator",
     "tank_view",
     "cloud_map",
+    "wall_map",
 )  # kinds that the PDF leaves out (report/web makes them)
 
 

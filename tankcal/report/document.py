@@ -117,6 +117,7 @@ _KEYS = {
     "figure": {"caption", "alt", "width", "svg"},
     "calculator": {"text", "unit", "height_m", "volume", "U", "deliveries"},
     "tank_view": {"text", "shell", "solid", "reason"},
+    "wall_map": {"text", "names", "azimuth_deg", "height_m", "residual_m", "joints_m", "rejected"},
     "cloud_map": {"text", "columns", "tenths", "azimuth_deg", "height_m", "limit_mm", "hidden"},
 }
 

@@ -10,6 +10,13 @@ from tankcal.messages import message
 from tankcal.report import manifest
 
 
+def default_folder(source):
+    """Where the results of a job (a Path) go when nobody says where."""
+    if source.suffix.lower() == ".xlsx":
+        return source.with_name(f"{source.stem}-results")
+    return (source.parent if source.name == "job.toml" else source) / "results"
+
+
 def refuse_foreign(directory, known):
     """Raise InputError when `directory` exists and holds a file that is not among `known`.
 

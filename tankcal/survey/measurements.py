@@ -290,6 +290,7 @@ class Measurements:
     nominal   None where the job has no vertical tank
     fiducials a FiducialFit for each photo that was read on a comparator: `image_points` are
               transformed by them already
+    kept      (file, row) of readings that no search for blunders may set aside
     """
 
     settings: AdjustmentSettings = AdjustmentSettings()
@@ -305,3 +306,4 @@ class Measurements:
     nominal: NominalTank | None = None
     fiducials: tuple[FiducialFit, ...] = ()
     correlated: CorrelatedReadings | None = None
+    kept: frozenset = frozenset()

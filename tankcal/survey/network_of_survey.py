@@ -161,6 +161,7 @@ def _gathered(measurements, excluded):
         observations=tuple(observations), sets=np.full(len(numbers.sets), np.nan),
         instruments=_instruments(measurements, numbers), systems=systems,
         correlated=blocks_of(measurements, observations), set_names=tuple(numbers.sets),
+        kept=measurements.kept,
     )  # fmt: skip
     return Gathered(survey, tuple(checks), known, None, {}, (), tuple(warnings))
 

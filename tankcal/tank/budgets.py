@@ -13,7 +13,14 @@ import numpy as np
 
 from tankcal.gum.distributions import within
 from tankcal.text.display import table_html, volume_text
-from tankcal.uncertainty import BudgetRow, Shares, Source, declared_source
+from tankcal.uncertainty import (
+    BudgetRow,
+    Shares,
+    Source,
+    combine,
+    declared_source,
+    scale_source,
+)
 
 HALF_A_LITRE_M3 = 5e-4
 
@@ -121,7 +128,7 @@ def _default(name, half_width):
     )
 
 
-def budget(table, high_m, low_m=None, reading=()):
+def budget(table, high_m, low_m=None, reading=(), factors=None):
     """Uncertainty budget of the volume below a dip, or between two dips.
 
     Parameters
@@ -133,6 +140,8 @@ def budget(table, high_m, low_m=None, reading=()):
         Lower dip of a delivery, m.
     reading : sequence of Source, optional
         Of `reading_sources`; none for the table alone.
+    factors : sequence of float, optional
+        What if the u of each line of this budget were so many times what it is; None: as it is.
 
     Returns
     -------
@@ -142,6 +151,8 @@ def budget(table, high_m, low_m=None, reading=()):
     ------
     HeightError
         For a dip outside the table.
+    ValueError
+        For another number of factors than lines, or one below 0.
 
     References
     ----------
@@ -157,18 +168,27 @@ def budget(table, high_m, low_m=None, reading=()):
     >>> table = Capacity(np.array([0, 1.0]), np.array([0, 100.0]), np.ones(2), (form,), 0.95)
     >>> print(budget(table, 0.5))
     0.5 m: 50.00 m3, U = 0.20 m3 (k = 1.96)
+
+    What if u of the form were half as large?
+
+    >>> print(budget(table, 0.5, factors=[0.5]))
+    0.5 m: 50.000 m3, U = 0.098 m3 (k = 1.96)
     """
     found = table.at(high_m) if low_m is None else table.delivery(low_m, high_m)
     dips = [high_m] if low_m is None else [low_m, high_m]
     weights = table.weights(dips[-1:]) - (0 if low_m is None else table.weights(dips[:1]))
     sources = [source.weighted(weights) for source in table.sources]
+    table_u_m3 = found.u_m3
     sources += [_read(source, table, dips) for source in reading]
+    if factors is not None:
+        sources = _scaled(sources, factors)
+        table_u_m3 = float(combine(sources[: len(table.sources)], 1).u[0])
     total = Shares(sources, table.probability)
     return Budget(
         low_m=low_m,
         high_m=high_m,
         volume_m3=found.value_m3,
-        table_u_m3=found.u_m3,
+        table_u_m3=table_u_m3,
         u_m3=total.u,
         dof=total.dof,
         k=total.k,
@@ -176,6 +196,16 @@ def budget(table, high_m, low_m=None, reading=()):
         for_use=found.for_use,
         lines=tuple(line for index in range(len(sources)) for line in _lines(total, index)),
     )
+
+
+def _scaled(sources, factors):
+    """The sources with u of each line times its factor."""
+    factors = [float(one) for one in factors]
+    ends = np.cumsum([0, *(max(len(one.parts), 1) for one in sources)])
+    if len(factors) != ends[-1] or not all(0 <= one < np.inf for one in factors):
+        raise ValueError(f"found {factors}; expected {ends[-1]} factors, 0 or more")
+    own = zip(sources, ends, ends[1:], strict=False)
+    return [scale_source(one, factors[start:stop]) for one, start, stop in own]
 
 
 def _read(source, table, dips):

@@ -53,6 +53,8 @@ FORM_WORDS = {
         "up": ("sobe",),
         "middle": ("meio", "linha média"),
         "down": ("desce",),
+        "keep": ("manter",),
+        "leave_out": ("retirar",),
     },
     "es": {
         YES: ("sí", "verdadero"),
@@ -99,6 +101,8 @@ FORM_WORDS = {
         "up": ("sube",),
         "middle": ("mitad", "línea media"),
         "down": ("baja",),
+        "keep": ("mantener",),
+        "leave_out": ("retirar",),
     },
 }
 

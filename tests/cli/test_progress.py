@@ -5,7 +5,8 @@ import sys
 
 import pytest
 
-from tankcal.cli.showing import Progress, how_far
+from tankcal.cli.showing import Progress
+from tankcal.text.time_left import how_far
 
 
 @pytest.mark.parametrize(

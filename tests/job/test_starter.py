@@ -259,7 +259,7 @@ def test_both_forms_filled_in_give_the_same_job(starter):
 def test_the_workbook_helps_to_fill_it_in(starter):
     book = openpyxl.load_workbook(starter / "job.xlsx")
     tables = ["points", "courses", "welds", "bottom", "deadwood", "uncertainty"]
-    tables += ["correlations", "stated"]
+    tables += ["correlations", "stated", "overrulings"]
     assert book.sheetnames == ["read me", "job", *tables, "# inputs"]
     lists = {rule.formula1 for rule in book["job"].data_validations.dataValidation}
     assert '"outside,inside"' in lists

@@ -66,7 +66,7 @@ def nothing_tested(accepted):
     return Tested(accepted.copy(), *nothing)
 
 
-def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted, barred=None):
+def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted, barred=None, may_go=True):
     """Test every reading of a wall by all others, with amplitudes that the accepted ones tell.
 
     Parameters
@@ -83,13 +83,17 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted, barred=None
         What is believed at first.
     barred : ndarray of bool, shape (n,), optional
         Readings that stay aside, whatever the others say; None: none.
+    may_go : ndarray of bool, shape (n,), optional
+        Readings that may be set aside; the others stay, and the amplitudes are learned from them,
+        too: a wall that is as rough as they say is less known between the readings.
 
     Returns
     -------
     Tested
     """
     barred = np.zeros(len(sites), dtype=bool) if barred is None else barred
-    accepted = accepted & ~barred
+    may_go = np.broadcast_to(may_go, len(sites))
+    accepted = (accepted | ~may_go) & ~barred
     pieces = [Piece(sites, members, nominal_m) for members in _pieces(sites)]
     left, found, sizes = radius_m - radius_m.mean(), nothing_tested(accepted), None
     for _ in range(MOST_ROUNDS):
@@ -102,7 +106,7 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted, barred=None
             own_noise = noise * variance_m2[own] + LEAST_NOISE_M**2
             precision, before_m = piece.precision(variances, own_noise)
             pull, most = precision @ left[own], MOST_SD * before_m
-            tested = snoop_wall(precision, pull, accepted[own], True, most, barred[own])
+            tested = snoop_wall(precision, pull, accepted[own], may_go[own], most, barred[own])
             for name in ("accepted", "departure_m", "w", "sd_m"):
                 getattr(found, name)[own] = getattr(tested, name)
         changed, accepted = np.mean(found.accepted != accepted), found.accepted.copy()

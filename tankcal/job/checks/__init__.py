@@ -37,6 +37,7 @@ from tankcal.job.contract.correlations import check_correlations
 from tankcal.job.contract.courses import check_courses
 from tankcal.job.contract.deadwood import check_deadwood
 from tankcal.job.contract.lying import check_horizontal, check_sphere
+from tankcal.job.contract.overrulings import check_overrulings
 from tankcal.job.contract.points import check_points
 from tankcal.job.contract.roof import check_roof
 from tankcal.job.contract.ship import check_ship
@@ -74,6 +75,8 @@ def check_all(values, tables, registers, raw, is_whole, log):
         if values is not None:
             check_metering(values, tables, registers, raw, log)
     check_survey(values, tables, registers, raw, is_whole, log)
+    if tables["overrulings"] is not None:
+        check_overrulings(tables["overrulings"], tables, is_whole, log)
 
 
 def check_tank(values, tables, raw, log):

@@ -14,6 +14,7 @@ from tankcal.job.contract import (
     hits,
     lines,
     liquid,
+    overrulings,
     points,
     radii,
     rings,
@@ -49,7 +50,7 @@ _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, 
 COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES}
 COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | tangents.COLUMNS | stadia.COLUMNS
 COLUMNS |= great_circles.COLUMNS | clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS
-COLUMNS |= rings.COLUMNS | SURVEY_COLUMNS
+COLUMNS |= rings.COLUMNS | SURVEY_COLUMNS | overrulings.COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS | radii.KEYS
 _KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
@@ -78,10 +79,11 @@ def tables_of_survey(kind, survey):
 
 REQUIRED_TABLES = {"vertical": ("points", "courses")}
 _OF_ALL = ("uncertainty", "correlations", "stated")
+_OF_SEARCHED = (*_OF_ALL, "overrulings")  # kinds of tank whose points are searched for blunders
 TABLES_OF_KIND = {
-    "vertical": ("points", "courses", "welds", "bottom", "deadwood", *_OF_ALL),
-    "horizontal": ("points", "deadwood", *_OF_ALL),
-    "sphere": ("points", "deadwood", *_OF_ALL),
+    "vertical": ("points", "courses", "welds", "bottom", "deadwood", *_OF_SEARCHED),
+    "horizontal": ("points", "deadwood", *_OF_SEARCHED),
+    "sphere": ("points", "deadwood", *_OF_SEARCHED),
     "mesh": ("deadwood", *_OF_ALL),
 }
 

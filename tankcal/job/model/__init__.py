@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from tankcal.job.model.clouds import Clouds
 from tankcal.job.model.liquid import Meter, Metering
+from tankcal.job.model.overrulings import Overruling
 from tankcal.job.model.parts import (
     Bottom,
     Course,
@@ -54,6 +55,7 @@ __all__ = [
     "Mesh",
     "Meter",
     "Metering",
+    "Overruling",
     "Points",
     "Radii",
     "Ring",
@@ -142,6 +144,8 @@ class Job:
         How they may have changed since then; beside a survey.
     great_circles : GreatCircles or None
         Equator and meridians of a sphere by tape, in place of points.
+    overrulings : tuple of Overruling
+        What was decided by hand against the search for blunders, in the order of the file.
     """
 
     tank: Tank | None
@@ -184,3 +188,4 @@ class Job:
     rings: tuple[Ring, ...] = ()
     great_circles: GreatCircles | None = None
     top: Top | None = None
+    overrulings: tuple[Overruling, ...] = ()

@@ -121,6 +121,21 @@ EXAMPLES_OF_TABLES = {
     ],
     "correlations": [{"input": "scale", "with": "datum", "r": 0.5}],
     "stated": [{"high_m": 9.0, "low_m": 2.0}],
+    "overrulings": [
+        {
+            "point": "P102",
+            "decision": "keep",
+            "reason": "dent, seen on site and photographed",
+            "by": "J. Silva",
+            "date": "2026-01-05",
+        },
+        {
+            "table": "directions",
+            "row": 14,
+            "decision": "leave_out",
+            "reason": "the observer noted a bump against the tripod",
+        },
+    ],
     "circumferences": [
         {
             "circumference": "1-20",

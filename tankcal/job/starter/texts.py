@@ -100,6 +100,8 @@ TABLE_NOTES = {
     " empty",
     "stated": "one row for each dip, or pair of dips, whose volume is to be reported with its"
     " budget; may stay empty",
+    "overrulings": "one row for each point or reading that was decided by hand against the search"
+    " for blunders; may stay empty",
     "circumferences": "one row for each reading of the tape round the tank",
     "obstructions": "one row for each kind of obstacle on the way of a circumference; may stay"
     " empty",

@@ -6,6 +6,7 @@ _WIDGETS = {
     "calculator": ("calculator", 2),
     "tank_view": ("view", 1),
     "cloud_map": ("cloud_map", 2),
+    "wall_map": ("wall_map", 2),
 }
 _DEEPEST = 2  # level of a heading that stands in the contents
 

@@ -189,4 +189,5 @@ _WRITERS = {
     "calculator": _paragraph,
     "tank_view": _paragraph,
     "cloud_map": _paragraph,
+    "wall_map": _paragraph,
 }

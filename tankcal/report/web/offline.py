@@ -13,7 +13,7 @@ from tankcal.report.web.contents import contents_html, with_ids
 from tankcal.report.web.elements import block_html
 from tankcal.report.web.packing import script_data
 from tankcal.report.web.tables import PIECE, framed_table, searchable_table
-from tankcal.report.web.widgets import calculator_html, map_html, view_html
+from tankcal.report.web.widgets import calculator_html, map_html, view_html, wall_html
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.shipped import shipped_folder
 from tankcal.text.words import load_words
@@ -22,13 +22,17 @@ _SCRIPTS = {
     "": ("numbers.js", "look.js"),
     "columns_table": ("finder.js",),
     "calculator": ("deliveries.js", "calculator.js"),
-    "cloud_map": ("map.js",),
-    "tank_view": ("matrices.js", "meshes.js", "scene.js", "view.js"),
+    "cloud_map": ("ramp.js", "map.js"),
+    "wall_map": ("ramp.js", "chosen.js", "wall.js"),
+    "tank_view": ("chosen.js", "matrices.js", "meshes.js", "scene.js", "view.js"),
 }
 
 
-def page(blocks):
-    """The blocks as one HTML page, in the words of their document's language."""
+def page(blocks, has_contents=True):
+    """The blocks as one HTML page, in the words of their document's language.
+
+    has_contents  False: without the list of its headings, as a notebook frames it
+    """
     first = blocks[0]
     language = first["language"] if first["language"] in LANGUAGES else DEFAULT
     words = load_words(language)
@@ -52,7 +56,7 @@ def page(blocks):
             "<body>",
             *_bar(first, blocks, words["web"]),
             '<div class="columns">',
-            contents_html(contents, words["web"]),
+            contents_html(contents, words["web"]) if has_contents else "",
             '<main id="main">',
             *_written(blocks, words["web"]),
             "</main>",
@@ -92,6 +96,8 @@ def _written(blocks, words):
             yield view_html(block, words)
         elif kind == "cloud_map":
             yield map_html(block, words)
+        elif kind == "wall_map":
+            yield wall_html(block, words)
         else:
             yield block_html(block)
 
@@ -115,7 +121,8 @@ def _bar(first, blocks, words):
 
 def _scripts_for(blocks):
     kinds = {"", *(block["kind"] for block in blocks)}
-    return [name for kind, names in _SCRIPTS.items() if kind in kinds for name in names]
+    wanted = [name for kind, names in _SCRIPTS.items() if kind in kinds for name in names]
+    return list(dict.fromkeys(wanted))
 
 
 def _template(name):

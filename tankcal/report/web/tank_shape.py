@@ -11,6 +11,7 @@ import numpy as np
 from tankcal.pipeline.plots import round_factor
 from tankcal.report.blocks import Block
 from tankcal.report.web.packing import packed
+from tankcal.report.web.wall_map import rejected_in_space
 
 MOST_POINTS = 4000  # that are drawn
 TENTH_MM = 1e4  # per metre: outlines are whole tenths of a millimetre
@@ -56,6 +57,7 @@ def shell_of(record):
         "rings": _rings(record["courses"], sections, shell, bottom_z_m, radius_m),
         "exaggeration": exaggeration,
         "points": _points(record, bottom_z_m),
+        "rejected": rejected_in_space(record, largest),
     }
 
 

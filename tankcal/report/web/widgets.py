@@ -69,6 +69,19 @@ def map_html(block, words):
     )
 
 
+def wall_html(block, words):
+    """The wall unrolled: its points, those that were rejected, and what is said of the chosen."""
+    data = {key: block[key] for key in block if key not in ("kind", "text", "id")}
+    return (
+        f'<section class="widget" id="wall" hidden><h3 id="{block["id"]}">'
+        f"{escape(words['wall_map'])}</h3><p>{escape(words['wall_map_text'])}</p>"
+        '<canvas class="map" tabindex="0" role="img" '
+        f'aria-label="{escape(words["wall_map_alt"])}"></canvas>'
+        '<p class="answer" id="wall-told" role="status">\u00a0</p>'
+        f"{_data('wall', data)}</section>"
+    )
+
+
 def _view_controls(words):
     choices = "".join(
         f'<option value="{value}">{escape(words[f"from_{value}"])}</option>'

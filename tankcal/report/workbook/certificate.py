@@ -2,6 +2,7 @@
 
 from tankcal.report.certificate import doubts_of
 from tankcal.report.numbers import unit
+from tankcal.report.tables import overrulings
 from tankcal.report.tables.facts import REFERENCES, SURVEY, SURVEY_DATE, tank_facts
 from tankcal.report.uncertainty import method, rule
 from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
@@ -37,6 +38,7 @@ def certificate_sheet(book, record):
     )  # fmt: skip
     row = _uncertainty(book, sheet, row, book.paper)
     row = _corrections(book, sheet, row, record)
+    row = _overrulings(book, sheet, row)
     row = _choices(book, sheet, row, record)
     _authorisation(book, sheet, row)
 
@@ -170,6 +172,18 @@ def _corrections(book, sheet, row, record):
     if not applied:
         row += 1
         book.put(sheet, row, 0, sentence(words, "texts", "no_corrections"))
+    return row + 2
+
+
+def _overrulings(book, sheet, row):
+    """What was decided against the search for blunders, a sentence each; returns the next row."""
+    told = overrulings.sentences(book.paper)
+    if not told:
+        return row
+    book.heading(sheet, row, book.paper.word("headings.overrulings"), len(_WIDTHS))
+    for text in told:
+        row += 1
+        book.paragraph(sheet, row, text, _WIDTHS)
     return row + 2
 
 

@@ -16,7 +16,7 @@ from tankcal.survey.diagnosis.diagnoses import find_swapped_points, mirrored_fit
 from tankcal.survey.network import adjust, snoop
 from tankcal.survey.network.assembly import assemble
 from tankcal.survey.network.blocks import CORRELATED
-from tankcal.survey.network.snooping import set_use, start_from_adjusted
+from tankcal.survey.network.snooping import kept_of, set_use, start_from_adjusted
 from tankcal.survey.observations import Directions, Distances
 from tankcal.survey.start.photographs import sights_of
 from tankcal.survey.start.resection import bearings, intersect_rays
@@ -155,6 +155,7 @@ def gross_readings(survey):
         if gross.any() and gross.mean() < MOST:
             found[source] = np.zeros(len(survey.observations[source]), dtype=bool)
             found[source][rows[gross]] = True
+            found[source] &= ~kept_of(survey.observations[source], survey.kept)
     return found
 
 

@@ -61,13 +61,15 @@ def snoop(survey, *, critical=CRITICAL, test="w", robust=True, max_rounds=200, *
               estimates (Pope); its critical value has the same probability of a false alarm
     options   of tankcal.survey.network.adjust
 
-    What holds exactly (sd 0) is never set aside. Returns a Cleaned. Raises SolutionError when the
-    adjustment fails.
+    What holds exactly (sd 0), and what the Survey keeps, is never set aside. Returns a Cleaned.
+    Raises SolutionError when the adjustment fails.
     """
     if test not in ("w", "tau"):
         raise ValueError(f"test {test!r}: w or tau")
+    candidates = _Candidates(survey)
+    survey = candidates.with_kept(survey)
     adjusted, rounds = adjust(survey, **options), 1
-    limit, candidates = _limit(adjusted, critical, test), _Candidates(survey)
+    limit = _limit(adjusted, critical, test)
     suspects = _suspects(adjusted, limit)
     if robust and np.nanmax(candidates.statistic(adjusted)[1], initial=0) > limit:
         try:
@@ -113,6 +115,14 @@ def _limit(adjusted, critical, test):
         return critical
     alpha = 2 * float(ndtr(-critical))
     return adjusted.sigma0 * tau_limit(alpha, adjusted.dof)
+
+
+def kept_of(one, kept):
+    """(n,) which of some observations are readings that are kept, (file, row) each."""
+    trace = one.trace
+    if trace is None:
+        return np.zeros(len(one), dtype=bool)
+    return np.array([(trace.file, row) in kept for row in trace.rows], dtype=bool)
 
 
 def start_from_adjusted(survey, adjusted):
@@ -176,6 +186,15 @@ class _Candidates:
         self.count = ends[-1]
         self.slices = dict(zip(counts, map(slice, ends, ends[1:]), strict=False))
         self.kinds = {source: one.kind for source, one in tables.items()}
+        self.kept = np.zeros(self.count, dtype=bool)
+        for source, one in tables.items() if survey.kept else ():
+            self.kept[self.slices[source]] = kept_of(one, survey.kept)
+
+    def with_kept(self, survey):
+        """The survey in which whatever it keeps takes part, even if it begins set aside."""
+        if not self.kept.any():
+            return survey
+        return self.with_shares(survey, np.where(self.kept, 1.0, self.shares(survey)))
 
     def places(self, table):
         """(n,) places of the rows of Residuals."""
@@ -187,6 +206,7 @@ class _Candidates:
         for table in _tables(adjusted):
             mine = self.places(table)
             used[mine], statistic[mine] = table.used, table.test_statistic
+        statistic[self.kept] = np.nan  # its word stands, though all others are tested against it
         return used, statistic
 
     def shares(self, survey):

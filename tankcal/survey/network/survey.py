@@ -153,6 +153,8 @@ class Survey:
     correlated : tuple of tankcal.survey.observations.Block
         Values of the observations (none of them
         held exactly) that are correlated; no value stands in two.
+    kept : frozenset
+        (file, row) of readings that no search for blunders may set aside.
     """
 
     points: tuple
@@ -167,6 +169,7 @@ class Survey:
     systems: tuple = ()
     correlated: tuple = ()
     set_names: tuple = ()
+    kept: frozenset = frozenset()
 
     @property
     def nuisances(self):

@@ -1,0 +1,135 @@
+"""`tankcal notebook` and `tankcal app`: a job as a notebook, and the same without its code."""
+
+import argparse
+from pathlib import Path
+
+from tankcal.cli.showing import complain, prepare_for_small_work, say, speak
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+from tankcal.text.languages import LANGUAGES
+
+MOST_PORT = 65535
+
+
+def add(commands):
+    """The parsers of `tankcal notebook` and `tankcal app`."""
+    notebook = commands.add_parser(
+        "notebook",
+        help="edit, check and compute a job in a notebook",
+        description="Write one notebook that is the job, and open it in JupyterLab: its tables as "
+        "grids that are checked as they are filled in, a button that computes, and the results. "
+        "A notebook that was changed by hand is kept.",
+    )
+    _add_job(notebook)
+    notebook.add_argument(
+        "--out",
+        metavar="FILE",
+        help="the notebook to write (default: tankcal.ipynb in the job's folder, or NAME.ipynb "
+        "beside NAME.xlsx)",
+    )
+    notebook.add_argument("--no-open", action="store_true", help="write the notebook alone")
+    notebook.set_defaults(command=_notebook)
+    app = commands.add_parser(
+        "app",
+        help="serve a job as a page without code",
+        description="Serve the notebook of a job as a page without code (Voilà), to be edited, "
+        "computed and saved in a browser of this machine. Ctrl-C ends it.",
+    )
+    _add_job(app)
+    app.add_argument(
+        "--address",
+        metavar="ADDRESS",
+        default="127.0.0.1",
+        help="the address of this machine to listen on (default: 127.0.0.1, which no other machine "
+        "can reach)",
+    )
+    app.add_argument("--port", metavar="N", type=_port, help="the port (default: one that is free)")
+    app.add_argument("--no-browser", action="store_true", help="open no browser")
+    app.set_defaults(command=_app)
+
+
+def _add_job(parser):
+    parser.add_argument("job", metavar="JOB", help="a job folder, its job.toml, or a job workbook")
+    parser.add_argument(
+        "--language",
+        choices=LANGUAGES,
+        help="of the notebook and of everything in it (default: that of the job)",
+    )
+
+
+def _port(text):
+    if not (text.isascii() and text.isdigit() and 0 < int(text[:9]) <= MOST_PORT):
+        raise argparse.ArgumentTypeError(argparse._("invalid int value: %r") % text)
+    return int(text)
+
+
+def _written(options, out):
+    """Path of the notebook of a job, written or kept as it is."""
+    from tankcal.cli.asked_language import asked_language
+    from tankcal.workbench.draft import source_of
+    from tankcal.workbench.notebook_file import notebook_path, write_notebook
+
+    language = options.language or asked_language(options.job)
+    if language is not None:
+        speak(language)
+    source = source_of(options.job)
+    path = Path(out) if out is not None else notebook_path(source)
+    if path.suffix.lower() != ".ipynb" or path.is_dir():
+        expected = message("name_of_notebook", "expected the name of a notebook (.ipynb)")
+        raise InputError(Problem("--out", expected))
+    if write_notebook(source, path, options.language):
+        say(message("wrote_notebook", "notebook: {file}", file=str(path)))
+    else:
+        text = message(
+            "kept_notebook",
+            "notebook: {file} was changed by hand and is kept; --out FILE writes a new one",
+            file=str(path),
+        )
+        say(text)
+    return path
+
+
+def _notebook(options):
+    from tankcal.workbench import serving
+
+    path = _written(options, options.out)
+    if options.no_open:
+        return
+    if not serving.has_lab():
+        complain(
+            message(
+                "no_lab",
+                "JupyterLab is not installed here: pip install 'tankcal[lab]' installs it with the "
+                "grids; the notebook also opens in any other Jupyter",
+            )
+        )
+        return
+    prepare_for_small_work()
+    serving.open_lab(path)
+
+
+def _app(options):
+    from tankcal.workbench import serving
+
+    if not serving.has_app():
+        expected = message(
+            "no_app", "Voilà is not installed here: pip install 'tankcal[app]' installs it"
+        )
+        raise InputError(Problem("tankcal app", expected))
+    path = _written(options, None)
+    port = serving.free_port(options.address, options.port)
+    token = ""
+    if not serving.is_local(options.address):
+        token = serving.new_token()
+        complain(
+            message(
+                "app_is_open",
+                "warning: every machine that reaches {address} can read, change and compute this "
+                "job, if it has the token of this address; what is sent is not encrypted",
+                address=options.address,
+            )
+        )
+    address = f"http://{options.address}:{port}/" + (f"?token={token}" if token else "")
+    say(message("app_address", "open {address} in a browser; Ctrl-C ends it", address=address))
+    prepare_for_small_work()
+    serving.serve_app(path, port, options.address, not options.no_browser, token)

@@ -1,0 +1,5 @@
+"""The workbench: a job edited, checked and computed in a notebook (docs/notebook.md)."""
+
+from tankcal.workbench.desk import Desk, Refusal, open_job
+
+__all__ = ["Desk", "Refusal", "open_job"]

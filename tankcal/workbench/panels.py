@@ -1,0 +1,322 @@
+"""The widgets of a desk: grids, list of problems, Save, Run with progress, results."""
+
+import asyncio
+from html import escape
+
+import ipywidgets as widgets
+
+from tankcal.errors import InputError, TankcalError
+from tankcal.workbench.desk import Refusal
+from tankcal.workbench.grid import Grid
+from tankcal.workbench.result_views import live_results
+
+PAUSE_S = 0.3  # after an edit, before the job is checked
+
+
+def later(desk):
+    """Check the job when nothing was typed for a moment, then tell everybody."""
+    try:
+        loop = asyncio.get_running_loop()
+    except RuntimeError:  # nobody waits
+        desk.tell()
+        return
+    if desk.waiting is not None:
+        desk.waiting.cancel()
+    desk.waiting = loop.call_later(PAUSE_S, desk.tell)
+
+
+def _button(text, act, style="", icon=""):
+    made = widgets.Button(description=text, button_style=style, icon=icon, layout={"width": "auto"})
+    made.on_click(lambda _: act())
+    return made
+
+
+def _page(html=""):
+    return widgets.HTML(html)
+
+
+# ---- tables
+
+
+def table_panel(desk, name):
+    """A table, a list or the settings as a grid."""
+    return widgets.VBox([TableGrid(desk, name).grid])
+
+
+class TableGrid:
+    """The grid of a table of a desk: what is typed goes to the desk, its marks come back."""
+
+    def __init__(self, desk, name):
+        self.desk, self.name = desk, name
+        shown = desk.show(name)
+        words = desk.reader.words["workbench"]["grid"]
+        self.grid = Grid(
+            name=name, label=shown.title, words=words, takes_rows=shown.takes_rows,
+            **self._content(shown),
+        )  # fmt: skip
+        self.grid.on_msg(self._heard)
+        desk.listen(self.refresh)
+
+    def _content(self, shown):
+        return {
+            "columns": [vars(one) for one in shown.columns],
+            "rows": shown.rows,
+            "marks": self._marks(shown),
+            "addable": list(shown.addable),
+            "every_key": self.desk.every_key.get(self.name, False),
+            "locked": self.desk.draft.locked is not None,
+        }
+
+    @staticmethod
+    def _marks(shown):
+        return [[*place, *mark] for place, mark in shown.marks.items()]
+
+    def refresh(self):
+        """Show the table as it stands on the desk: changed cells alone where nothing else did."""
+        desk, grid = self.desk, self.grid
+        if self.name not in desk.draft.tables and self.name not in desk.draft.keys:
+            return  # taken back by Undo; the check says what is missing
+        shown = desk.show(self.name)
+        content = self._content(shown)
+        same = len(shown.rows) == len(grid.rows) and content["columns"] == grid.columns
+        if same:
+            cells = [
+                (row, place, text)
+                for row, (new, old) in enumerate(zip(shown.rows, grid.rows, strict=True))
+                if new != old
+                for place, text in enumerate(new)
+                if text != old[place]
+            ]
+            if cells:
+                grid.put(cells)
+            content.pop("rows")
+            content.pop("columns")
+        with grid.hold_sync():
+            for key, value in content.items():
+                setattr(grid, key, value)
+
+    def _heard(self, _widget, content, _buffers):
+        desk = self.desk
+        try:
+            getattr(self, f"_{content['kind']}")(
+                **{k: v for k, v in content.items() if k != "kind"}
+            )
+        except InputError as error:  # a locked workbook, a key that is not edited here
+            say(desk, "\n".join(desk.reader.say(one) for one in error.texts))
+            self.refresh()
+            return
+        if content["kind"] == "every":
+            self.refresh()
+            return
+        desk.edited()
+        later(desk)
+
+    def _enter(self, changes):
+        self.desk.reader.enter(
+            self.desk.draft, self.name, changes, self.desk.every_key.get(self.name, False)
+        )
+
+    def _paste(self, row, column, cells):
+        draft, shown = self.desk.draft, self.grid.columns
+        if self.name in draft.tables:
+            short = row + len(cells) - len(draft.tables[self.name].rows)
+            if short > 0:
+                draft.insert_rows(self.name, len(draft.tables[self.name].rows), short)
+        changes = [
+            (row + down, shown[column + right]["name"], text)
+            for down, line in enumerate(cells)
+            for right, text in enumerate(line)
+            if column + right < len(shown)
+        ]
+        self._enter(changes)
+
+    def _insert(self, row, count):
+        self.desk.draft.insert_rows(self.name, row, count)
+        self.refresh()
+
+    def _remove(self, rows):
+        self.desk.draft.remove_rows(self.name, rows)
+        self.refresh()
+
+    def _column(self, name):
+        self.desk.draft.add_column(self.name, name)
+        self.refresh()
+
+    def _every(self, value):
+        self.desk.every_key[self.name] = bool(value)
+
+    def _undo(self):
+        self.desk.draft.undo()
+
+
+def say(desk, text):
+    """Say something at the head of the desk."""
+    desk.said = text
+    desk.tell()
+
+
+# ---- head, problems, further tables
+
+
+def head_panel(desk):
+    """Which job it is, its state, Save and Undo."""
+    word, page = desk.reader.word, _page()
+
+    def save():
+        try:
+            written = desk.save()
+        except Refusal as error:
+            say(desk, str(error))
+            return
+        except OSError as error:
+            say(desk, word("not_saved", reason=error.strerror or str(error)))
+            return
+        names = ", ".join(path.name for path in written)
+        say(desk, word("saved", files=names) if written else word("nothing_to_save"))
+
+    def undo():
+        if desk.draft.undo():
+            desk.changed()
+
+    save_button = _button(word("save"), save, "primary", "save")
+    save_button.add_class("tankcal-save")
+
+    def refresh():
+        state = word("unsaved") if desk.draft.is_changed else word("as_on_disk")
+        lines = [*desk.head_text().splitlines(), state, *desk.said.splitlines()]
+        page.value = "".join(f"<div>{escape(line)}</div>" for line in lines)
+
+    page.add_class("tankcal-head")
+    desk.listen(refresh)
+    refresh()
+    return widgets.VBox(
+        [page, widgets.HBox([save_button, _button(word("undo"), undo, "", "undo")])]
+    )
+
+
+def findings_panel(desk):
+    """Every problem and warning, live."""
+    page = _page()
+    page.add_class("tankcal-findings")
+
+    def refresh():
+        page.value = desk.problems.page
+
+    desk.listen(refresh)
+    refresh()
+    return widgets.VBox([page])
+
+
+def further_panel(desk):
+    """Adds a table that the job may have, and shows its grid."""
+    reader = desk.reader
+    names = {f"{reader.title(name)} ({name})": name for name in desk.further}
+    choice = widgets.Dropdown(options={"": None, **names}, layout={"width": "24em"})
+    grids = widgets.VBox([])
+
+    def add():
+        if choice.value is None:
+            return
+        name = choice.value
+        try:
+            if name not in desk.draft.tables:
+                desk.draft.add_table(name)
+        except InputError as error:
+            say(desk, "\n".join(reader.say(one) for one in error.texts))
+            return
+        heading = _page(f"<h3>{escape(reader.title(name))}</h3><p>{escape(reader.note(name))}</p>")
+        grids.children = (*grids.children, heading, TableGrid(desk, name).grid)
+        desk.changed()
+
+    button = _button(reader.word("add_table"), add)
+    return widgets.VBox([widgets.HBox([choice, button]), grids])
+
+
+# ---- results
+
+
+def results_panel(desk):
+    """Run and Stop, progress with the time left, and the results below."""
+    return ResultsPanel(desk).box
+
+
+class ResultsPanel:
+    """Runs the saved job in a thread; the widgets are changed in the loop of the notebook alone."""
+
+    def __init__(self, desk):
+        word = desk.reader.word
+        self.desk, self.run = desk, None
+        self.button = _button(word("run"), self.start, "success", "play")
+        self.button.add_class("tankcal-run")
+        self.stopper = _button(word("stop"), self.stop, "warning", "stop")
+        self.stopper.disabled = True
+        self.papers = widgets.Checkbox(value=True, description=word("with_papers"), indent=False)
+        self.bar = widgets.FloatProgress(min=0, max=1, layout={"width": "16em"})
+        self.step, self.state, self.view = _page(), _page(), widgets.VBox([])
+        self.step.add_class("tankcal-step")
+        self.state.add_class("tankcal-state")
+        self.view.add_class("tankcal-view")
+        tools = [self.button, self.stopper, self.papers, self.bar, self.step]
+        self.box = widgets.VBox([widgets.HBox(tools), self.state, self.view])
+        desk.listen(self.refresh)
+
+    def refresh(self):
+        """Say that what is shown is older than the job, when it is."""
+        if self.desk.is_stale and self.run is None:
+            self._state(self.desk.reader.word("stale"), "#6b4e00")
+
+    def start(self):
+        """Save and compute."""
+        if self.run is not None:
+            return
+        loop = asyncio.get_running_loop()
+
+        def on_loop(act):
+            return lambda *given: loop.call_soon_threadsafe(act, *given)
+
+        try:
+            self.run = self.desk.begin(on_loop(self._tell), self.papers.value, on_loop(self._show))
+        except (Refusal, OSError) as error:
+            self._state(str(error))
+            return
+        self.button.disabled, self.stopper.disabled = True, False
+        self._state("", "")
+        thread = self.run.start()
+        self.waiting = loop.create_task(self._finish(thread))
+
+    def stop(self):
+        """Ask the run to stop."""
+        if self.run is not None:
+            self.run.stop()
+            self.step.value = escape(self.desk.reader.word("stopping"))
+
+    def _tell(self, text, share):
+        self.step.value = escape(self.desk.reader.say(text))
+        if share is not None:
+            self.bar.value = share
+
+    def _show(self, result):
+        """The results as soon as they are there, while the papers are being written."""
+        self.desk.keep_run(self.run)
+        self.view.children = (live_results(self.desk),)
+
+    async def _finish(self, thread):
+        await asyncio.to_thread(thread.join)
+        run, self.run = self.run, None
+        self.button.disabled, self.stopper.disabled = False, True
+        self.step.value, self.bar.value = "", 0
+        word = self.desk.reader.word
+        if run.error is None:
+            names = ", ".join(path.name for path in run.files)
+            self._state(word("written", folder=str(self.desk.out), files=names), "#1b5e20")
+        elif isinstance(run.error, TankcalError):
+            self._state("\n".join(self.desk.reader.say(one) for one in run.error.texts))
+        elif isinstance(run.error, OSError):
+            reason = run.error.strerror or str(run.error)
+            self._state(word("not_written", reason=reason))
+        else:
+            self._state(f"{type(run.error).__name__}: {run.error}")
+
+    def _state(self, text, colour="#8c1d18"):
+        lines = "".join(f"<div>{escape(line)}</div>" for line in text.splitlines())
+        self.state.value = f'<div style="color: {colour}">{lines}</div>' if lines else ""

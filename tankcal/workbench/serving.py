@@ -1,0 +1,107 @@
+"""Programs of others that show the notebook: JupyterLab, and Voilà without the code."""
+
+import ipaddress
+import os
+import secrets
+import socket
+from contextlib import suppress
+from importlib.util import find_spec
+
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+
+HERE = "127.0.0.1"
+# The page takes nothing from elsewhere, and its kernel's messages go nowhere else: the template of
+# Voilà names a style sheet of another host, which a machine without a network would wait for.
+POLICY = (
+    "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob: ws: wss:; frame-ancestors 'self'"
+)
+
+
+def has_lab():
+    """Is JupyterLab installed, with the widgets of the grids?"""
+    return all(map(find_spec, ("jupyterlab", "ipywidgets", "anywidget")))
+
+
+def has_app():
+    """Is Voilà installed, with the widgets of the grids?"""
+    return all(map(find_spec, ("voila", "ipywidgets", "anywidget")))
+
+
+def open_lab(notebook, is_browser=True):
+    """Show a notebook in JupyterLab, on this machine alone, until it is stopped."""
+    from jupyterlab.labapp import LabApp
+
+    _let_kernels_start_quickly()
+    given = [str(notebook), f"--ServerApp.ip={HERE}", "--ServerApp.answer_yes=True"]
+    LabApp.launch_instance(given if is_browser else [*given, "--no-browser"])
+
+
+def serve_app(notebook, port, address=HERE, is_browser=True, token=""):
+    """Serve a notebook by Voilà, without its code, until it is stopped.
+
+    Parameters
+    ----------
+    notebook : Path
+    port : int
+    address : str
+        That it listens on.
+    is_browser : bool
+        Open it in a browser.
+    token : str
+        That a visitor must bring; "": none.
+    """
+    from traitlets.config import Config
+    from voila.app import Voila
+
+    _let_kernels_start_quickly()
+    given = [
+        str(notebook),
+        f"--Voila.ip={address}",
+        f"--port={port}",
+        f"--Voila.open_browser={bool(is_browser)}",
+        f"--token={token}",
+        "--strip_sources=True",
+    ]
+    headers = {"Content-Security-Policy": POLICY}
+    settings = Config({"Voila": {"tornado_settings": {"headers": headers}}})
+    Voila.launch_instance(given, config=settings)
+
+
+def is_local(address):
+    """Is it an address that this machine alone can reach?"""
+    with suppress(ValueError):
+        return ipaddress.ip_address(address).is_loopback
+    return address == "localhost"
+
+
+def new_token():
+    """A word that nobody guesses."""
+    return secrets.token_urlsafe(18)
+
+
+def free_port(address, wanted=None):
+    """The port asked for, or any that is free; InputError where the address or port is not ours."""
+    try:
+        family = socket.getaddrinfo(address, wanted or 0, type=socket.SOCK_STREAM)[0][0]
+        with socket.socket(family, socket.SOCK_STREAM) as tried:
+            tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            tried.bind((address, wanted or 0))
+            return tried.getsockname()[1]
+    except (OSError, OverflowError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        expected = message(
+            "address_not_free",
+            "cannot listen on port {port} of {address} ({reason})",
+            port=str(wanted or 0),
+            address=address,
+            reason=reason,
+        )
+        raise InputError(Problem("--port" if wanted else "--address", expected)) from error
+
+
+def _let_kernels_start_quickly():
+    """As the command line does: a second BLAS thread costs time with small matrices."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ.setdefault("TANKCAL_COMPILED", "patient")
+    os.environ.setdefault("PYDEVD_DISABLE_FILE_VALIDATION", "1")
