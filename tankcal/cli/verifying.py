@@ -1,8 +1,9 @@
 """`tankcal verify`: whether the files of a run belong together."""
 
 from tankcal.cli.arguments import add_language
-from tankcal.cli.machine import add_json, print_json, problem_of
+from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.showing import prepare_for_small_work, say, speak_of_record
+from tankcal.errors import problem_of
 from tankcal.messages import message
 
 
