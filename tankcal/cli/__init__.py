@@ -6,6 +6,7 @@ import sys
 
 import tankcal
 from tankcal.cli import (
+    batching,
     camera,
     comparing,
     exporting,
@@ -43,6 +44,7 @@ a new tank, step by step:
   tankcal verify my-tank/results                 do the files of a run belong together?
   tankcal export my-tank/results --profile NAME   the table as a gauging system takes it
   tankcal inspect my-tank                      plumb, roundness and settlement by the same survey
+  tankcal batch site --out site-results        the same with many jobs, on all cores
 
 photographs, distances, angles and levels instead of surveyed points:
   tankcal new my-tank --survey photos          (or total-station) write such a job
@@ -116,7 +118,7 @@ def _parser():
     commands = parser.add_subparsers(metavar="COMMAND")
 
     tables = (linting, table_reading, comparing, exporting, inspecting, verifying)
-    rooms = (running, reporting, starting, importing, planning, *tables, camera)
+    rooms = (running, batching, reporting, starting, importing, planning, *tables, camera)
     for room in rooms:
         room.add(commands)
     if words_of_run():

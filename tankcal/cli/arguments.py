@@ -76,19 +76,25 @@ def parse_count(text):
     return int(text)
 
 
+def parse_workers(text):
+    """Number of workers on this machine."""
+    workers = parse_count(text)
+    if workers > MOST_WORKERS:
+        raise refuse_argument(
+            message(
+                "option_workers",
+                "found {text!r}; expected at most {most} workers on one machine",
+                text=text,
+                most=MOST_WORKERS,
+            )
+        )
+    return workers
+
+
 def parse_cluster(text):
     """Who reads clouds: "auto", "local", a number of workers, or the address of a scheduler."""
     if WHOLE_NUMBER.fullmatch(text):
-        if int(text) > MOST_WORKERS:
-            raise refuse_argument(
-                message(
-                    "option_workers",
-                    "found {text!r}; expected at most {most} workers on one machine",
-                    text=text,
-                    most=MOST_WORKERS,
-                )
-            )
-        return int(text)
+        return parse_workers(text)
     if text not in ("auto", "local") and ":" not in text:
         raise refuse_argument(
             message(

@@ -77,9 +77,13 @@ def _table(block, rows, caption):
 
 def _rows(block):
     """The rows as HTML, for their numbers line up over the whole table."""
-    formulas = block.get("formulas", ())
+    formulas, links = block.get("formulas", ()), block.get("links", {})
     columns = [
-        _cells(column, align, block["decimal_mark"], _with_formulas if i in formulas else escape)
+        _linked(column, links[i], align)
+        if i in links
+        else _cells(
+            column, align, block["decimal_mark"], _with_formulas if i in formulas else escape
+        )
         for i, (column, align) in enumerate(
             zip(zip(*block["rows"], strict=True), block["align"], strict=False)
         )
@@ -93,6 +97,16 @@ def _cells(texts, align, mark, shown):
     return [
         f'<td class="{align}">{shown(text)}{fill}</td>'
         for text, fill in zip(texts, fills, strict=True)
+    ]
+
+
+def _linked(texts, links, align):
+    """The cells of a column that lead somewhere: `links` has an address for each, "" for none."""
+    return [
+        f'<td class="{align}">'
+        + (f'<a href="{escape(link)}">{escape(text)}</a>' if link else escape(text))
+        + "</td>"
+        for text, link in zip(texts, links, strict=True)
     ]
 
 
