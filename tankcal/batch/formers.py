@@ -1,13 +1,21 @@
 """The former table of each job."""
 
 import os
+from functools import lru_cache
 from pathlib import Path
 
+from tankcal.batch.outcomes import known_names
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
 ENDINGS = (".toml", ".csv", ".xlsx", ".pdf", ".json")
 RECORD = "record.json"
+
+
+@lru_cache(maxsize=4)
+def _names_in(folder):
+    """{source: name} of the jobs of a former batch."""
+    return known_names(folder)
 
 
 def former_or_none(job):
@@ -34,7 +42,8 @@ def former_of(job):
         return folder
     if (folder / RECORD).is_file():
         return folder / RECORD
-    for name in dict.fromkeys((job.name, job.label)):
+    names = (_names_in(str(folder)).get(job.source), job.name, job.label)
+    for name in dict.fromkeys(one for one in names if one):
         places = [folder / name, folder / "jobs" / name / "results", folder / name / "results"]
         tables = [folder / f"{name}{ending}" for ending in ENDINGS]
         for path in (*(one / RECORD for one in places), *tables):
