@@ -231,8 +231,8 @@ def _listed(path, wants, log):
     text = None if data is None else decode(path.name, data, log)
     if text is None:
         return []
-    lines = text.splitlines()
-    rows = _rows(path, lines, log) if path.suffix.lower() == ".csv" else _plain_rows(lines)
+    lines, told = text.splitlines(), len(log.problems)
+    rows = list(_rows(path, lines, log) if path.suffix.lower() == ".csv" else _plain_rows(lines))
     found = []
     for own in rows:
         job = own.pop("job")
@@ -243,7 +243,7 @@ def _listed(path, wants, log):
         source = path.parent / job
         inside = _in_path(source, wants, log, strict=False) or [Found(source, {})]
         found += [Found(one.source, own) for one in inside]
-    if not found:
+    if not found and len(log.problems) == told:
         log.problem(path.name, message("batch_empty_list", "a list without jobs"))
     return found
 
