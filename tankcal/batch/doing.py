@@ -81,22 +81,27 @@ def do_job(task):
 
 def _do_steps(task):
     """What `do_job` gives."""
-    journal, clock = Journal(task.out, task.run), Clock()
-    journal.note("begun", task.job.name)
     name, steps = task.job.name, task.job.asked.do
     found = load_outcome(task.out, name) or Outcome(name, task.job.source)
-    found = replace(found, source=task.job.source)
-    for step in steps:
+    if not found.is_settled_for(task.keys):  # or its worker died before it could say so
+        journal, clock = Journal(task.out, task.run), Clock()
+        journal.note("begun", name)
+        found = _after_steps(replace(found, source=task.job.source), task, clock)
+        journal.note("ended", name, status=found.status(steps), cpu_s=clock.seconds())
+    done, status = [found.steps[one] for one in steps if one in found.steps], found.status(steps)
+    problems = [one for step in done for one in step.problems]
+    return status, problems[:1], sum(step.problem_count for step in done)
+
+
+def _after_steps(found, task, clock):
+    """The `Outcome` after the steps that were not settled, written after each."""
+    for step in task.job.asked.do:
         if not found.is_settled(step, task.keys[step]):
             found = replace(found, steps={**found.steps, step: _outcome_of(step, task, clock)})
             save_outcome(task.out, found)
         if step == "run" and found.steps[step].status != "done":
             break
-    done = [found.steps[one] for one in steps if one in found.steps]
-    status = found.status(steps)
-    journal.note("ended", name, status=status, cpu_s=clock.seconds())
-    problems = [one for step in done for one in step.problems]
-    return status, problems[:1], sum(step.problem_count for step in done)
+    return found
 
 
 def _check_folder(task):

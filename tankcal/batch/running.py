@@ -29,7 +29,8 @@ from tankcal.errors import Problem, problem_of
 from tankcal.messages import message
 from tankcal.pipeline.cluster import Watch, count_cores, failures_told, is_installed, open_client
 
-TRIES = 3  # of a job whose worker dies
+TRIES = 3  # of a job whose worker dies while it is computed
+MOST_DEATHS = 12  # of workers that a job was given to, begun or not
 AHEAD = 2  # jobs of each worker that are with the scheduler
 LOOK_S = 1.0  # between looks at whether there are workers at all
 WORKER_BYTES = 2 << 30
@@ -190,6 +191,7 @@ class _ByWorkers:
     def __init__(self, client, journal, ended):
         self._client, self._journal, self._tell_ended = client, journal, ended
         self._watch, self._running, self._ended = Watch(client), {}, queue.SimpleQueue()
+        self._deaths = Counter()
 
     def do(self, waiting):
         """All of them; raises what stops a batch as a whole."""
@@ -238,7 +240,7 @@ class _ByWorkers:
             future.release()
         if found is not None:
             self._tell_ended(task, *found)
-        elif self._journal.deaths(task.job.name) < TRIES:
+        elif self._is_tried_again(task):
             self._submit(task)
         else:
             text = message(
@@ -248,6 +250,14 @@ class _ByWorkers:
                 count=TRIES,
             )
             self._tell_ended(task, *fail_job(task, Problem(task.job.name, text)))
+
+    def _is_tried_again(self, task):
+        """Whether a job may have been beside the one that ended a worker, or that by chance."""
+        self._deaths[task.job.name] += 1
+        return (
+            self._journal.deaths(task.job.name) < TRIES
+            and self._deaths[task.job.name] < MOST_DEATHS
+        )
 
 
 def fail_job(task, problem):

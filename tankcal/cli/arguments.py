@@ -8,6 +8,7 @@ from tankcal.text.languages import LANGUAGES
 from tankcal.text.numerals import NUMBER, WHOLE_NUMBER
 
 MOST_WORKERS = 256  # on one machine
+LEAST_WORKER_GB = 0.5
 
 
 def add_language(parser):
@@ -89,6 +90,21 @@ def parse_workers(text):
             )
         )
     return workers
+
+
+def parse_worker_memory(text):
+    """Gigabytes of memory of a worker."""
+    value = positive(text)
+    if value < LEAST_WORKER_GB:
+        raise refuse_argument(
+            message(
+                "option_worker_memory",
+                "found {text!r}; expected at least {least} gigabytes; jobs with papers need 1",
+                text=text,
+                least=LEAST_WORKER_GB,
+            )
+        )
+    return value
 
 
 def parse_cluster(text):

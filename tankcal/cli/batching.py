@@ -4,7 +4,7 @@ import shlex
 import sys
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, parse_workers, positive
+from tankcal.cli.arguments import add_language, parse_worker_memory, parse_workers
 from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.reporting import add_letterhead
 from tankcal.cli.showing import (
@@ -68,7 +68,7 @@ def add(commands):
     batch.add_argument(
         "--worker-memory",
         metavar="GB",
-        type=positive,
+        type=parse_worker_memory,
         default=2.0,
         help="memory that a worker on this machine may take, in gigabytes (default: 2); one that "
         "takes more is ended, and its job tried again",

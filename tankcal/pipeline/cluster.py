@@ -22,6 +22,7 @@ from tankcal.messages import message
 OPTION = "--cluster"
 WORKER_BYTES = 1 << 30  # of memory that a worker of this machine may take
 LENGTH, LONGEST_GREETING = struct.Struct("<Q"), 1 << 20  # bytes of the first message of a scheduler
+DEAF = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"  # Ctrl-C is the client's
 CONNECT_S, ALONE_S = 5, 30  # to connect; without any worker
 
 
@@ -92,6 +93,7 @@ def _client_of(workers, worker_bytes, more):
         else:
             memory = {"pause": False, "spill": False, "target": False}
             settings = {f"distributed.worker.memory.{name}": of for name, of in memory.items()}
+            settings["distributed.worker.preload"] = [DEAF]
             stack.enter_context(dask.config.set(settings | more))
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tankcal-"))
             address = stack.enter_context(

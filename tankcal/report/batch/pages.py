@@ -8,6 +8,7 @@ from tankcal.report.batch.tables import JOBS
 MOST_ROWS = 5000  # of the page: more are only in workbook and CSV, those that are not done first
 STATUSES = ("done", "unsound", "refused", "failed")  # from the best to the worst
 MOST_GONE = 20
+WRAPPED = ("changes", "told")  # columns whose cells are sentences
 
 
 def pages(paper):
@@ -67,8 +68,10 @@ def _rows(paper):
         rows = sorted(worst_first[:MOST_ROWS], key=lambda row: row["name"])
         told = [paper.paragraph("not_all", shown=MOST_ROWS, all=len(paper.found["rows"]))]
     table = paper.show(JOBS, known(rows))
-    place = len(table.data["columns"]) - 1
-    return [*told, blocks.Block(table.data | {"links": {place: [paper.link(one) for one in rows]}})]
+    links = {len(table.data["columns"]) - 1: [paper.link(one) for one in rows]}
+    shown = [one.key for one in JOBS.on_paper(None, known(rows))]
+    whole = [number for number, key in enumerate(shown) if key not in WRAPPED]
+    return [*told, blocks.Block(table.data | {"links": links, "whole": whole})]
 
 
 def known(rows):
