@@ -5,7 +5,7 @@
 
 from dataclasses import dataclass
 
-from tankcal.messages import message
+from tankcal.messages import Message, as_plain, message
 
 SHEET = "sheet "  # how the file of a problem in a workbook begins
 
@@ -81,6 +81,29 @@ class Problem:
 
     def __str__(self):
         return str(self.text)
+
+
+def problem_of(problem):
+    """A `Problem` as plain data: place, text in English, code and values."""
+    return {
+        "book": problem.book,
+        "file": problem.file,
+        "row": problem.row,
+        "column": problem.column,
+        "cell": problem.cell,
+        "text": str(problem.expected),
+        **as_plain(problem.expected),
+    }
+
+
+def problem_from(plain):
+    """The `Problem` that plain data is of, to be said in any language (see `problem_of`)."""
+    text = plain["text"]
+    if plain.get("code"):
+        text = Message(text)
+        text.code, text.values = plain["code"], plain["values"]
+    places = {name: plain.get(name) for name in ("row", "column", "cell", "book")}
+    return Problem(plain["file"], text, **places)
 
 
 class InputError(TankcalError):

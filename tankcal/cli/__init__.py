@@ -6,6 +6,7 @@ import sys
 
 import tankcal
 from tankcal.cli import (
+    batching,
     camera,
     comparing,
     completing,
@@ -51,6 +52,7 @@ a new tank, step by step:
   tankcal verify my-tank/results                 do the files of a run belong together?
   tankcal export my-tank/results --profile NAME   the table as a gauging system takes it
   tankcal inspect my-tank                      plumb, roundness and settlement by the same survey
+  tankcal batch site --out site-results        the same with many jobs, on all cores
 
 photographs, distances, angles and levels instead of surveyed points:
   tankcal new my-tank --survey photos          (or total-station) write such a job
@@ -140,9 +142,9 @@ def _parser_in_english():
     parser.set_defaults(command=None, shown=parser)
     commands = parser.add_subparsers(metavar="COMMAND")
 
+    main_job = (running, batching, reporting, starting, workbench, importing, planning)
     tables = (linting, table_reading, comparing, history, exporting, inspecting, verifying)
-    others = (camera, intercomparison)
-    for room in (running, reporting, starting, workbench, importing, planning, *tables, *others):
+    for room in (*main_job, *tables, camera, intercomparison):
         room.add(commands)
     pages.add(commands)
     completing.add(commands, _parser_in_english)

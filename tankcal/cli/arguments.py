@@ -8,6 +8,7 @@ from tankcal.text.languages import LANGUAGES
 from tankcal.text.numerals import NUMBER, WHOLE_NUMBER
 
 MOST_WORKERS = 256  # on one machine
+LEAST_WORKER_GB = 0.5
 
 
 def add_language(parser):
@@ -76,19 +77,40 @@ def parse_count(text):
     return int(text)
 
 
+def parse_workers(text):
+    """Number of workers on this machine."""
+    workers = parse_count(text)
+    if workers > MOST_WORKERS:
+        raise refuse_argument(
+            message(
+                "option_workers",
+                "found {text!r}; expected at most {most} workers on one machine",
+                text=text,
+                most=MOST_WORKERS,
+            )
+        )
+    return workers
+
+
+def parse_worker_memory(text):
+    """Gigabytes of memory of a worker."""
+    value = positive(text)
+    if value < LEAST_WORKER_GB:
+        raise refuse_argument(
+            message(
+                "option_worker_memory",
+                "found {text!r}; expected at least {least} gigabytes; jobs with papers need 1",
+                text=text,
+                least=LEAST_WORKER_GB,
+            )
+        )
+    return value
+
+
 def parse_cluster(text):
     """Who reads clouds: "auto", "local", a number of workers, or the address of a scheduler."""
     if WHOLE_NUMBER.fullmatch(text):
-        if int(text) > MOST_WORKERS:
-            raise refuse_argument(
-                message(
-                    "option_workers",
-                    "found {text!r}; expected at most {most} workers on one machine",
-                    text=text,
-                    most=MOST_WORKERS,
-                )
-            )
-        return int(text)
+        return parse_workers(text)
     if text not in ("auto", "local") and ":" not in text:
         raise refuse_argument(
             message(

@@ -1,6 +1,5 @@
 """`tankcal export`: files for gauging and inventory systems, from a record."""
 
-import re
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language, parse_list, positive
@@ -106,6 +105,8 @@ def _refuse_missing(options):
 
 def _out(options, export, source):
     """The file to write: as asked, or named by the tank and the profile, in this folder."""
+    from tankcal.exports.exporting import default_name
+
     if options.out is not None:
         out = Path(options.out)
         if (
@@ -119,8 +120,7 @@ def _out(options, export, source):
             )  # fmt: skip
             raise InputError(Problem("--out", text))
         return out
-    tank = re.sub(r"[^\w.()-]+", "_", export.tank).strip("._") or "tank"
-    return Path(f"{tank}-{export.profile.code}{export.profile.ending}")
+    return Path(default_name(export))
 
 
 def _list(options):

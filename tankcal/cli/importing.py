@@ -5,8 +5,9 @@ import shlex
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language, positive, refuse_argument
-from tankcal.cli.machine import add_json, print_json, problem_of
+from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.showing import prepare_for_small_work, say, speak, warn
+from tankcal.errors import problem_of
 from tankcal.messages import message
 
 

@@ -1,9 +1,9 @@
 """`tankcal lint`: mistakes in any capacity table."""
 
 from tankcal.cli.arguments import add_language, positive
-from tankcal.cli.machine import add_json, print_json, problem_of
+from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.showing import prepare_for_small_work, say, speak
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, problem_of
 from tankcal.messages import message
 
 MOST_FINDINGS = 50  # that are shown at once

@@ -3,8 +3,7 @@
 import json
 import sys
 
-from tankcal.errors import InputError
-from tankcal.messages import as_plain
+from tankcal.errors import InputError, problem_of
 
 
 def add_json(parser):
@@ -30,17 +29,4 @@ def failure(error):
         "exit_status": error.exit_status,
         "problems": [problem_of(one) for one in problems],
         "error": None if problems else str(error),
-    }
-
-
-def problem_of(problem):
-    """A `Problem` as the record writes warnings: place, text in English, code and values."""
-    return {
-        "book": problem.book,
-        "file": problem.file,
-        "row": problem.row,
-        "column": problem.column,
-        "cell": problem.cell,
-        "text": str(problem.expected),
-        **as_plain(problem.expected),
     }

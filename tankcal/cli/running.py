@@ -5,7 +5,7 @@ from pathlib import Path
 
 import tankcal
 from tankcal.cli.arguments import parse_cluster
-from tankcal.cli.machine import add_json, print_json, problem_of
+from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.reporting import add_letterhead, letterhead_of
 from tankcal.cli.set_aside import lines_set_aside
 from tankcal.cli.showing import (
@@ -18,7 +18,7 @@ from tankcal.cli.showing import (
     say,
     warn,
 )
-from tankcal.errors import Problem, SolutionError
+from tankcal.errors import Problem, SolutionError, problem_of
 from tankcal.messages import message
 from tankcal.report.folders import default_folder
 from tankcal.text.digits import decimals_of_height, fixed, format_significant, format_with_u

@@ -158,6 +158,12 @@ class Progress:
             print(f"\r{shown}{TO_THE_END}", end="", file=sys.stderr, flush=True)
         self.now = text
 
+    def aside(self, text):
+        """A line on standard error, above that of a step that goes on."""
+        if self.live and self.now and not self.quiet:
+            print(f"\r{TO_THE_END}", end="", file=sys.stderr)
+        complain(text)
+
     def end(self):
         if self.live and self.now and not self.quiet:
             print(file=sys.stderr)

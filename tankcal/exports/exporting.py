@@ -16,6 +16,7 @@ from tankcal.exports.shell_movement import GaugeCorrection, gauge_correction
 from tankcal.exports.writing import body_of, file_text, read_back
 from tankcal.job.tables import Log
 from tankcal.messages import message
+from tankcal.text.naming import file_name
 from tankcal.text.words import load_words, say
 
 
@@ -132,6 +133,11 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
         error + own, at, own, int(off_mark.sum()), gauge, tuple(facts), data,
         None if rows[-1] == len(height) - 1 else float(height[-1]),
     )  # fmt: skip
+
+
+def default_name(export):
+    """What the file of an export is called where nobody says: by the tank and the profile."""
+    return f"{file_name(export.tank, 'tank')}-{export.profile.code}{export.profile.ending}"
 
 
 def write_export(export, out, language="en"):

@@ -2,40 +2,30 @@
 
 Each share of a file is read by one worker, which gives back its sample or its sums; these are added
 in a tree. They are whole numbers and samples that know no order, so the record has the same bytes
-with any number of workers and any shares. This is the only module that knows of dask.
+with any number of workers and any shares. The workers themselves are those of `cluster`.
 """
 
 import contextlib
 import ctypes
-import importlib.util
-import logging
-import os
 import socket
-import struct
-import tempfile
 import time
 import uuid
-import warnings
 from functools import cache
-from urllib.parse import urlsplit
 
-import tankcal
 from tankcal.clouds import count_about
 from tankcal.clouds.wall.cells import WallCells
 from tankcal.clouds.wall.passes import cells_of, sample_of
-from tankcal.errors import InputError, Problem, TankcalError
+from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.pipeline.cloud_passes import JobPasses, Tally
+from tankcal.pipeline.cluster import Watch, count_cores, failures_told, is_installed, open_client
 
-OPTION = "--cluster"
 PAYS, FEWEST_CORES = 200_000_000, 4  # points and cores from which local workers pay: docs/clouds.md
 FEWEST_EACH, MOST_EACH = 1 << 20, 1 << 23  # points of a share
 SHARES_OF_WORKER = 6
 FAN = 8  # parts that are added at once
-WORKER_BYTES = 1 << 30  # of memory that a worker of this machine may take
-LENGTH, LONGEST_GREETING = struct.Struct("<Q"), 1 << 20  # bytes of the first message of a scheduler
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, KEPT_BYTES = -1, -3, 8 << 20  # of mallopt(3)
-CONNECT_S, ALONE_S, LOOK_S = 5, 30, 0.05  # to connect; without any worker; between looks
+LOOK_S = 0.05  # between looks
 
 
 @contextlib.contextmanager
@@ -51,123 +41,19 @@ def open_passes(placing, reading, telling):
     if workers == 0:
         yield JobPasses(placing, telling)
         return
-    if importlib.util.find_spec("distributed") is None:
-        raise _refusal(
-            message(
-                "cluster_no_library",
-                "needs the library distributed, which is not installed; expected: "
-                "pip install 'tankcal[cluster]'",
-            )
-        )
-    with _quiet(), _client_of(workers) as client:
+    with open_client(workers) as client:
         yield ClusterPasses(client, placing, telling)
 
 
 def _workers_for(placing, cluster):
     """Number of local workers, 0: none; or an address."""
-    cores = _cores()
+    cores = count_cores()
     if cluster == "auto":
-        if cores < FEWEST_CORES or importlib.util.find_spec("distributed") is None:
+        if cores < FEWEST_CORES or not is_installed():
             return 0
         points = sum(count_about(file.header) for file in placing.files)
         return cores if points >= PAYS else 0
     return {None: 0, "local": cores}.get(cluster, cluster)
-
-
-def _cores():
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-
-
-@contextlib.contextmanager
-def _quiet():
-    """Without what dask logs and warns of: problems are told in words."""
-    logger = logging.getLogger("distributed")
-    before = logger.level
-    logger.setLevel(logging.CRITICAL + 1)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        logger.setLevel(before)
-
-
-@contextlib.contextmanager
-def _client_of(workers):
-    """A client of local workers, or of the scheduler at an address."""
-    import dask
-    from distributed import Client, LocalCluster
-
-    with contextlib.ExitStack() as stack:
-        if isinstance(workers, str):
-            address = workers
-            _greet(address)
-        else:
-            memory = {"pause": False, "spill": False, "target": False}
-            settings = {f"distributed.worker.memory.{name}": of for name, of in memory.items()}
-            stack.enter_context(dask.config.set(settings))
-            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tankcal-"))
-            address = stack.enter_context(
-                LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    memory_limit=WORKER_BYTES,
-                    dashboard_address=None,
-                    local_directory=folder,
-                    silence_logs=logging.CRITICAL + 1,
-                )
-            )
-        try:
-            client = stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
-        except Exception as error:  # whatever a port that is none of dask comes up with
-            raise _no_answer(address, error) from error
-        with _failures_told():
-            _check_workers(client, workers)
-        yield client
-
-
-def _greet(address):
-    """InputError where nothing at an address greets as a scheduler of dask does.
-
-    A greeting begins with its length; of a port that speaks otherwise dask would take a number of
-    bytes that no memory holds, and of one that is silent it waits for long.
-    """
-    try:
-        found = urlsplit(address if "://" in address else f"tcp://{address}")
-        if found.scheme not in ("tcp", "tls") or not (found.hostname and found.port):
-            raise ValueError(address)
-        with socket.create_connection((found.hostname, found.port), CONNECT_S) as stream:
-            if found.scheme == "tls":
-                return
-            stream.settimeout(CONNECT_S)
-            head = b""
-            while len(head) < LENGTH.size:
-                if not (more := stream.recv(LENGTH.size - len(head))):
-                    raise ConnectionError
-                head += more
-        if LENGTH.unpack(head)[0] > LONGEST_GREETING:
-            raise ConnectionError
-    except (OSError, ValueError) as error:
-        raise _no_answer(address, error) from error
-
-
-def _check_workers(client, workers):
-    """InputError where there are no workers, or some of another version of tankcal."""
-    try:
-        client.wait_for_workers(1, timeout=CONNECT_S if isinstance(workers, str) else ALONE_S)
-    except TimeoutError as error:
-        raise _no_workers() from error
-    for worker, version in client.run(_version, on_error="return").items():
-        if version != tankcal.__version__:
-            raise _refusal(
-                message(
-                    "cluster_other_version",
-                    "worker {worker} has tankcal {found}; expected {version}, as here",
-                    worker=worker,
-                    found=version if isinstance(version, str) else type(version).__name__,
-                    version=tankcal.__version__,
-                )
-            )
 
 
 class ClusterPasses:
@@ -186,12 +72,12 @@ class ClusterPasses:
 
     def sample(self, most):
         """`PointSample` of at most so many points."""
-        with _failures_told():
+        with failures_told():
             return self._reduced(_sample_part, _add_samples, most)
 
     def cells(self, surface, grid, scans):
         """`WallCells` of all points."""
-        with _failures_told():
+        with failures_told():
             packed = self._reduced(_cells_part, _add_cells, surface, grid, scans)
         cells = WallCells(surface, grid, scans)
         cells.add_packed(packed)
@@ -199,7 +85,7 @@ class ClusterPasses:
 
     def gather(self, taken_of, *sizes):
         """What taken_of(points, *sizes) takes of all points; two of it have `merged`."""
-        with _failures_told():
+        with failures_told():
             return self._reduced(_taken_part, _add_taken, taken_of, *sizes)
 
     def _reduced(self, part_of, added, *sizes):
@@ -247,35 +133,12 @@ class ClusterPasses:
 
     def _result_of(self, future, tell):
         """The result of a future; InputError in one line for what keeps it from coming."""
-        alone_since = None
+        watch = Watch(self.client)
         while not future.done():
             time.sleep(LOOK_S)
             tell()
-            if self.client.scheduler_info(n_workers=-1)["workers"]:
-                alone_since = None
-                continue
-            alone_since = alone_since or time.monotonic()
-            if time.monotonic() - alone_since > ALONE_S:
-                raise _no_workers()
+            watch.look()
         return future.result()
-
-
-@contextlib.contextmanager
-def _failures_told():
-    """InputError in one line for whatever dask, a network or another machine comes up with."""
-    try:
-        yield
-    except TankcalError:
-        raise
-    except Exception as error:
-        raise _refusal(
-            message(
-                "cluster_failed",
-                "its workers came to no end ({reason}): did one run out of memory, or was the "
-                "scheduler ended?",
-                reason=type(error).__name__,
-            )
-        ) from error
 
 
 def _sample_part(placing, share, topic, number, most):
@@ -357,32 +220,3 @@ def _keep_memory():
         malloc = ctypes.CDLL(None).mallopt
         malloc(M_MMAP_THRESHOLD, KEPT_BYTES)
         malloc(M_TRIM_THRESHOLD, 2 * KEPT_BYTES)
-
-
-def _version():
-    return tankcal.__version__
-
-
-def _no_answer(address, error):
-    return _refusal(
-        message(
-            "cluster_no_answer",
-            "no scheduler of dask answers at {address} ({reason}); expected such as "
-            "tcp://192.168.1.20:8786, where `dask scheduler` runs",
-            address=str(address),
-            reason=getattr(error, "strerror", None) or type(error).__name__,
-        )
-    )
-
-
-def _no_workers():
-    return _refusal(
-        message(
-            "cluster_no_workers",
-            "the cluster has no workers; expected one at least, by `dask worker ADDRESS`",
-        )
-    )
-
-
-def _refusal(text):
-    return InputError(Problem(OPTION, text))

@@ -29,7 +29,7 @@ from tankcal.clouds.wall.surfaces import CylinderSurface
 from tankcal.errors import InputError, Problem
 from tankcal.job.model.clouds import CloudFile
 from tankcal.messages import message
-from tankcal.pipeline import cloud_cluster, cloud_wall
+from tankcal.pipeline import cloud_cluster, cloud_wall, cluster
 from tankcal.pipeline.cloud_cluster import ClusterPasses, open_passes
 from tankcal.pipeline.cloud_passes import JobPasses, Placing, Reading, Share, Telling
 from tankcal.record import record_of
@@ -197,7 +197,7 @@ def refusal(placing, cluster):
 @pytest.fixture
 def quick(monkeypatch):
     for name, seconds in QUICK.items():
-        monkeypatch.setattr(cloud_cluster, name, seconds)
+        monkeypatch.setattr(cluster, name, seconds)
 
 
 @pytest.mark.parametrize("speech", [b"", b"HTTP/1.1 400 Bad Request\r\n\r\n", None])
@@ -222,7 +222,7 @@ def test_an_address_that_does_not_answer(placing, quick, address):
 
 
 def test_without_the_library(placing, monkeypatch):
-    monkeypatch.setattr(cloud_cluster.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(cluster.importlib.util, "find_spec", lambda name: None)
     assert refusal(placing, 2) == "cluster_no_library"
     with open_passes(placing, Reading("auto"), Telling()) as passes:
         assert isinstance(passes, JobPasses)
@@ -243,12 +243,12 @@ def test_workers_that_all_go(placing, quick, monkeypatch):
 
 
 def test_local_workers_where_they_pay(placing, monkeypatch):
-    monkeypatch.setattr(cloud_cluster, "_cores", lambda: 4)
+    monkeypatch.setattr(cloud_cluster, "count_cores", lambda: 4)
     assert cloud_cluster._workers_for(placing, "auto") == 0
     assert cloud_cluster._workers_for(placing, "local") == 4
     monkeypatch.setattr(cloud_cluster, "PAYS", 10_000)
     assert cloud_cluster._workers_for(placing, "auto") == 4
-    monkeypatch.setattr(cloud_cluster, "_cores", lambda: 2)
+    monkeypatch.setattr(cloud_cluster, "count_cores", lambda: 2)
     assert cloud_cluster._workers_for(placing, "auto") == 0
 
 

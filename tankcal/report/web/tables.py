@@ -77,9 +77,17 @@ def _table(block, rows, caption):
 
 def _rows(block):
     """The rows as HTML, for their numbers line up over the whole table."""
-    formulas = block.get("formulas", ())
+    formulas, whole = block.get("formulas", ()), block.get("whole", ())
+    links = block.get("links", {})  # {column: the address of each cell, "" for none}
     columns = [
-        _cells(column, align, block["decimal_mark"], _with_formulas if i in formulas else escape)
+        _cells(
+            column,
+            align,
+            block["decimal_mark"],
+            _with_formulas if i in formulas else escape,
+            links=links.get(i),
+            look=f"{align} whole" if i in whole else align,
+        )
         for i, (column, align) in enumerate(
             zip(zip(*block["rows"], strict=True), block["align"], strict=False)
         )
@@ -87,12 +95,17 @@ def _rows(block):
     return [f"<tr>{''.join(cells)}</tr>" for cells in zip(*columns, strict=True)]
 
 
-def _cells(texts, align, mark, shown):
-    """The cells of one column; under "decimal", filled up so that the decimal marks line up."""
+def _cells(texts, align, mark, shown, *, links, look):
+    """The cells of one column; under "decimal", filled up so that the decimal marks line up.
+
+    links  address of each, "" for none; None: none has one
+    """
     fills = decimal_fills(texts, mark) if align == "decimal" else [""] * len(texts)
     return [
-        f'<td class="{align}">{shown(text)}{fill}</td>'
-        for text, fill in zip(texts, fills, strict=True)
+        f'<td class="{look}">'
+        + (f'<a href="{escape(link)}">{shown(text)}</a>' if link else shown(text))
+        + f"{fill}</td>"
+        for text, fill, link in zip(texts, fills, links or [""] * len(texts), strict=True)
     ]
 
 

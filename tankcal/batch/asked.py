@@ -1,0 +1,150 @@
+"""What is asked of each job of a batch."""
+
+import os
+from dataclasses import dataclass, replace
+from os.path import exists
+
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+
+STEPS = ("run", "report", "compare", "inspect", "export")  # in the order in which they are done
+FOLDERS = {
+    "run": "results",
+    "report": "report",
+    "compare": "comparison",
+    "inspect": "inspection",
+    "export": "export",
+}
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is to be done with each job, and how.
+
+    Attributes
+    ----------
+    do : tuple of str
+        Some of STEPS, in their order.
+    papers : bool
+        False: of `run` record and CSV files only.
+    language : str or None
+        Of what `report`, `compare` and `inspect` write; None: that of the job.
+    letterhead : str or None
+        Path of its file, for the papers.
+    former : str or None
+        A former table, or a folder of them called by the names of the jobs.
+    compare_by, inspect_by : str or None
+        Rules, by name or file.
+    profile : str or None
+        Of `export`, by name or file.
+    """
+
+    do: tuple[str, ...] = ("run",)
+    papers: bool = True
+    language: str | None = None
+    letterhead: str | None = None
+    former: str | None = None
+    compare_by: str | None = None
+    inspect_by: str | None = None
+    profile: str | None = None
+
+    def with_own(self, own):
+        """The same with what one job of a list has by itself, {name: text}; blanks count not."""
+        return replace(self, **{name: text for name, text in own.items() if text})
+
+    def absolute(self):
+        """The same with the files that are there by their absolute paths, for other processes."""
+        named = {name: getattr(self, name) for name in FILES}
+        there = {name: os.path.abspath(one) for name, one in named.items() if one and exists(one)}
+        return replace(self, **there)
+
+
+FILES = ("letterhead", "former", "compare_by", "inspect_by", "profile")
+OWN = ("former", "compare_by", "inspect_by", "profile", "language")  # columns of a list of jobs
+
+
+def parse_steps(text):
+    """The steps that a text such as "run,export" names, in their order; InputError for others.
+
+    Examples
+    --------
+    >>> from tankcal.batch.asked import parse_steps
+    >>> parse_steps("export, run")
+    ('run', 'export')
+    """
+    named = [one.strip() for one in text.split(",") if one.strip()]
+    unknown = [one for one in named if one not in STEPS]
+    if unknown or not named:
+        expected = message(
+            "batch_steps",
+            "found {text!r}; expected one or some of {steps}, with commas between",
+            text=text[:60],
+            steps=[*STEPS],
+        )
+        raise InputError(Problem("--do", expected))
+    return tuple(one for one in STEPS if one in named)
+
+
+def refuse_incomplete(asked, jobs):
+    """Raise InputError where a step lacks what it needs of every job: a former table, a profile."""
+    former = message(
+        "batch_needs_former",
+        "missing; compare needs a former table: a file, a folder of them, or a column former in "
+        "the list of jobs",
+    )
+    profile = message(
+        "batch_needs_profile",
+        "missing; export needs one of those that tankcal export --list shows, or a .toml file",
+    )
+    needed = (
+        ("compare", "former", "--former", former),
+        ("export", "profile", "--profile", profile),
+    )
+    problems = [
+        Problem(option, text)
+        for step, name, option, text in needed
+        if step in asked.do and any(getattr(job.asked, name) is None for job in jobs)
+    ]
+    if problems:
+        raise InputError(problems)
+
+
+def refuse_unreadable(asked):
+    """Raise InputError for letterhead, rules and profile that no job could use."""
+    problems = []
+    for use in (_use_letterhead, _use_profile, _use_rules):
+        try:
+            use(asked)
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+
+
+def _use_letterhead(asked):
+    if asked.letterhead is not None:
+        from tankcal.report.letterhead import load
+
+        load(asked.letterhead)
+
+
+def _use_profile(asked):
+    if asked.profile is not None and "export" in asked.do:
+        from tankcal.exports.profiles import find_profile
+
+        find_profile(asked.profile)
+
+
+def _use_rules(asked):
+    from tankcal.job.tables import Log
+
+    log = Log()
+    if asked.inspect_by is not None and "inspect" in asked.do:
+        from tankcal.inspection.rules import find_rule
+
+        find_rule(asked.inspect_by, log)
+    if asked.compare_by is not None and "compare" in asked.do:
+        from tankcal.job.rule_files import named_rule
+
+        named_rule(asked.compare_by, log)
+    log.stop_if_problems()

@@ -1,0 +1,301 @@
+"""What a worker does with one job: the steps that are not settled, each all or nothing."""
+
+import errno
+import os
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from tankcal.batch import reading
+from tankcal.batch.asked import FOLDERS
+from tankcal.batch.finding import RECORD, BatchJob
+from tankcal.batch.fingerprints import keys_of
+from tankcal.batch.formers import former_of, former_or_none
+from tankcal.batch.journal import JOURNAL, Journal
+from tankcal.batch.outcomes import (
+    MOST_TOLD,
+    Outcome,
+    StepOutcome,
+    folder_of,
+    load_outcome,
+    save_outcome,
+)
+from tankcal.errors import InputError, Problem, TankcalError, problem_of
+from tankcal.messages import message
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
+STATUS_OF_EXIT = {2: "refused", 3: "unsound"}
+
+
+@dataclass(frozen=True)
+class Task:
+    """A job on its way to a worker.
+
+    Attributes
+    ----------
+    job : BatchJob
+    keys : dict
+        {step: SHA-256} of all its steps.
+    out : str
+        Absolute path of the batch's folder.
+    run : str
+        Of the journal.
+    """
+
+    job: BatchJob
+    keys: dict
+    out: str
+    run: str
+
+
+def do_job(task):
+    """Do what is not settled yet of a job.
+
+    Returns
+    -------
+    status : str
+    problems : list of dict
+        The first of them.
+    count : int
+        Of all problems.
+
+    Raises
+    ------
+    InputError
+        Where this machine does not see the batch's folder, or that takes no more: what stops the
+        batch, for no other job would get further.
+    """
+    _check_folder(task)
+    try:
+        return _do_steps(task)
+    except OSError as error:
+        text = message(
+            "batch_no_room",
+            "nothing more can be written there ({reason}); expected room for the results: then the "
+            "same command goes on",
+            reason=error.strerror or str(error),
+        )
+        raise InputError(Problem(task.out, text)) from error
+
+
+def _do_steps(task):
+    """What `do_job` gives."""
+    name, steps = task.job.name, task.job.asked.do
+    found = load_outcome(task.out, name) or Outcome(name, task.job.source)
+    if not found.is_settled_for(task.keys):  # or its worker died before it could say so
+        journal, clock = Journal(task.out, task.run), Clock()
+        journal.note("begun", name)
+        found = _after_steps(replace(found, source=task.job.source), task, clock)
+        journal.note("ended", name, status=found.status(steps), cpu_s=clock.seconds())
+    done, status = [found.steps[one] for one in steps if one in found.steps], found.status(steps)
+    problems = [one for step in done for one in step.problems]
+    return status, problems[:1], sum(step.problem_count for step in done)
+
+
+def _after_steps(found, task, clock):
+    """The `Outcome` after the steps that were not settled, written after each."""
+    for step in task.job.asked.do:
+        if not found.is_settled(step, task.keys[step]):
+            found = replace(found, steps={**found.steps, step: _outcome_of(step, task, clock)})
+            save_outcome(task.out, found)
+        if step == "run" and found.steps[step].status != "done":
+            break
+    return found
+
+
+def _check_folder(task):
+    if not os.path.exists(os.path.join(task.out, JOURNAL)):
+        import socket
+
+        text = message(
+            "batch_folder_not_seen",
+            "the worker on {machine} does not find it as {path}; expected the folder of the batch "
+            "under the same path on all machines of the cluster",
+            machine=socket.gethostname(),
+            path=task.out,
+        )
+        raise InputError(Problem("--out", text))
+
+
+def _outcome_of(step, task, clock):
+    """The `StepOutcome` of doing a step; of whatever goes wrong, what is said of it."""
+    key, name = task.keys[step], task.job.name
+    try:
+        with clock.step(step):
+            written = _DOING[step](task, clock)
+        with clock.step("row"):
+            values, warnings = reading.values_of(step, folder_of(task.out, name) / FOLDERS[step])
+        if keys_of(task.job, former_or_none(task.job))[step] != key:
+            text = message("batch_changed", "its files changed while it was computed; expected the "
+                           "next batch to compute it again")  # fmt: skip
+            return _unfinished(key, "failed", [Problem(name, text)])
+    except TankcalError as error:
+        status = STATUS_OF_EXIT.get(error.exit_status, "failed")
+        problems = getattr(error, "problems", None)
+        return _unfinished(key, status, problems or [Problem(name, one) for one in error.texts])
+    except MemoryError:
+        text = message("batch_no_memory", "more memory was needed than there is")
+        return _unfinished(key, "failed", [Problem(name, text)])
+    except OSError as error:
+        if error.errno in NO_ROOM:
+            raise
+        place = os.path.basename(str(error.filename or "")) or name
+        return _unfinished(key, "failed", [Problem(place, error.strerror or str(error))])
+    except Exception as error:  # a mistake of tankcal: it must not stop the other jobs
+        text = message("batch_mistake", "a mistake of tankcal, please report it with the job "
+                       "({name}: {error})", name=type(error).__name__,
+                       error=" ".join(str(error).split())[:300])  # fmt: skip
+        return _unfinished(key, "failed", [Problem(name, text)])
+    return StepOutcome(
+        key,
+        "done",
+        files=sorted(Path(one).name for one in written),
+        values=values,
+        warnings=warnings[:MOST_TOLD],
+        warning_count=len(warnings),
+    )
+
+
+def _unfinished(key, status, problems):
+    told = [problem_of(one) for one in problems[:MOST_TOLD]]
+    return StepOutcome(key, status, problems=told, problem_count=len(problems))
+
+
+# ---- the steps: each writes its folder, all or nothing, and gives the paths
+
+
+def _run(task, clock):
+    import tankcal
+    from tankcal.report import outputs
+
+    with clock.step("read"):
+        job = tankcal.load(task.job.source)
+    with clock.step("compute"):
+        result = tankcal.run(job)
+    asked = task.job.asked
+    return outputs.write(
+        result, _place(task, "run"), clock.progress, _letterhead(asked), papers=asked.papers
+    )
+
+
+def _report(task, clock):
+    from tankcal.report import comparison, inspection, outputs
+
+    source, asked = _record(task), task.job.asked
+    others = (
+        (comparison.comparison_file(source), comparison.rebuild),
+        (inspection.inspection_file(source), inspection.rebuild),
+    )
+    place, letterhead = _place(task, "report"), _letterhead(asked)
+    for saved, rebuild in others:
+        if saved is not None:
+            return rebuild(saved, place, asked.language, None, letterhead)
+    return outputs.rebuild(source, place, clock.progress, asked.language, letterhead)
+
+
+def _compare(task, clock):
+    from tankcal.recalibration.inputs import Asked, compare_files
+    from tankcal.record.comparison import plain_of_comparison
+    from tankcal.report.comparison import write_comparison
+
+    record, asked = _record(task), task.job.asked
+    found = compare_files(Asked(former_of(task.job), record, rule=asked.compare_by))
+    return write_comparison(
+        plain_of_comparison(found), _place(task, "compare"), _language(task, record), None,
+        _letterhead(asked),
+    )  # fmt: skip
+
+
+def _inspect(task, clock):
+    from tankcal.inspection.inspecting import Asked, inspect_files
+    from tankcal.record.inspection import plain_of_inspection
+    from tankcal.report.inspection import write_inspection
+
+    asked = task.job.asked
+    source, rule, levelled = reading.source_of_inspection(task.job, _place(task, "run"))
+    found = inspect_files(Asked(source, rule=asked.inspect_by or rule, **levelled))
+    plain = plain_of_inspection(found)
+    language = asked.language or reading.language_of(source)
+    return write_inspection(plain, _place(task, "inspect"), language, None, _letterhead(asked))
+
+
+def _export(task, clock):
+    from tankcal.exports.exporting import default_name, export_record, write_export
+    from tankcal.exports.profiles import find_profile
+    from tankcal.report import folders
+
+    record, language = _record(task), None
+    language = _language(task, record)
+    export = export_record(record, find_profile(task.job.asked.profile), language=language)
+    with folders.replaced(_place(task, "export")) as temporary:
+        return write_export(export, temporary / default_name(export), language)
+
+
+_DOING = {
+    "run": _run, "report": _report, "compare": _compare, "inspect": _inspect, "export": _export,
+}  # fmt: skip
+
+
+def _place(task, step):
+    return folder_of(task.out, task.job.name) / FOLDERS[step]
+
+
+def _record(task):
+    """The saved file that a step is done with: of this batch's run, or the job's own."""
+    made = _place(task, "run") / RECORD
+    return made if "run" in task.job.asked.do else Path(task.job.source)
+
+
+def _language(task, record):
+    return task.job.asked.language or reading.language_of(record)
+
+
+def _letterhead(asked):
+    if asked.letterhead is None:
+        return None
+    from tankcal.report.letterhead import load
+
+    return load(asked.letterhead)
+
+
+class Clock:
+    """Seconds of processor of this process and its ended children, by the part of a job."""
+
+    PARTS = {  # noqa: RUF012
+        "writing_record": "record",
+        "writing_workbook": "workbook",
+        "writing_report": "papers",
+    }
+
+    def __init__(self):
+        self._spent, self._part, self._since = {}, None, _processor_s()
+
+    @contextmanager
+    def step(self, part):
+        """What is spent until the end of the block is of this part."""
+        before = self._to(part)
+        try:
+            yield
+        finally:
+            self._to(before)
+
+    def progress(self, text, done, total):
+        """As `outputs.write` tells how far it is."""
+        self._to(self.PARTS.get(getattr(text, "code", None), self._part))
+
+    def seconds(self):
+        """{part: seconds}."""
+        self._to(None)
+        return {part: round(spent, 3) for part, spent in self._spent.items() if part}
+
+    def _to(self, part):
+        now, before = _processor_s(), self._part
+        self._spent[before] = self._spent.get(before, 0.0) + now - self._since
+        self._part, self._since = part, now
+        return before
+
+
+def _processor_s():
+    found = os.times()
+    return found.user + found.system + found.children_user + found.children_system or time.time()

@@ -1,0 +1,339 @@
+"""From what the command line names to jobs: folders, workbooks, patterns, lists; their names.
+
+A job's name is that of its folder or workbook; jobs of one name have a piece of the SHA-256 of
+their paths behind it. A job that the batch's folder has already keeps its name.
+"""
+
+import csv
+import glob
+import os
+import re
+import zipfile
+from collections import Counter
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from tankcal.batch.asked import OWN, Asked
+from tankcal.errors import InputError, Problem
+from tankcal.job.folder import decode
+from tankcal.job.tables import SETTINGS_FILE, SETTINGS_SHEET, Log, read_bytes
+from tankcal.messages import message
+from tankcal.text.naming import file_name
+
+RECORD = "record.json"
+SAVED = (RECORD, "comparison.json", "inspection.json")
+BOOK = ".xlsx"
+OUTCOME, OF_BATCH = "outcome.json", ("report", "export")
+PATTERN = re.compile(r"[*?\[]")
+HEADINGS = ("job", "name", *OWN)  # of a list of jobs; the first is needed
+DIGITS = 6  # of a digest behind a name
+MOST_LIST_BYTES = 100_000_000
+
+
+@dataclass(frozen=True)
+class Found:
+    """A job as it was named.
+
+    Attributes
+    ----------
+    source : Path
+        A job folder, a workbook, or a saved file such as record.json; maybe nothing at all, which
+        is told when it is read.
+    own : dict
+        What it has by itself: name, and those of `asked.OWN`.
+    """
+
+    source: Path
+    own: dict
+
+
+@dataclass(frozen=True)
+class BatchJob:
+    """One job of a batch.
+
+    Attributes
+    ----------
+    name : str
+        Of its folder.
+    label : str
+        Its own name, which others may have, too.
+    source : str
+        Absolute path.
+    asked : Asked
+    """
+
+    name: str
+    label: str
+    source: str
+    asked: Asked
+
+
+def find_jobs(arguments, asked, out=None, known=None):
+    """The jobs that arguments name, in the order of their names.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Job folders, workbooks, saved records, folders of any of these, shell patterns, lists
+        (`@jobs.txt`, `jobs.csv`).
+    asked : Asked
+    out : str, optional
+        Absolute path of the batch's folder, where no job is looked for.
+    known : dict, optional
+        {absolute path: name} of jobs that the batch's folder has.
+
+    Returns
+    -------
+    list of BatchJob
+
+    Raises
+    ------
+    InputError
+        For lists that cannot be read, and arguments that name no job.
+    """
+    log, found = Log(), {}
+    wants = _Wanted(_wanted(asked.do), out)
+    for argument in arguments:
+        for one in _named(argument, wants, log):
+            found.setdefault(os.path.abspath(one.source), one)  # a link is a job of its own
+    log.stop_if_problems()
+    return _with_names(found, asked, known or {})
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """What is looked for ("jobs", "records" or "either"), and the folder where it is not."""
+
+    kind: str
+    out: str | None
+
+
+def _wanted(do):
+    """What the steps are done with: "jobs", "records", or "either" with the job first."""
+    if "run" in do:
+        return "jobs"
+    return "either" if do == ("inspect",) else "records"
+
+
+def _named(argument, wants, log):
+    """The `Found`s of an argument."""
+    path = Path(argument.removeprefix("@"))
+    if argument.startswith("@") or (path.suffix.lower() == ".csv" and path.is_file()):
+        return _listed(path, wants, log)
+    if PATTERN.search(argument) and not os.path.lexists(argument):
+        names = sorted(glob.glob(argument, recursive=True))
+        if not names:
+            text = message("batch_no_match", "names nothing that there is; expected jobs")
+            log.problem(argument, text)
+        return [one for name in names for one in _in_path(Path(name), wants, log, strict=False)]
+    return _in_path(path, wants, log)
+
+
+def _in_path(path, wants, log, strict=True):
+    """The jobs of one path: itself, or those in a folder.
+
+    strict  whether a folder without any is told
+    """
+    own = _of_itself(path, wants)
+    if own is not None:
+        return [Found(own, {})]
+    if not path.is_dir():
+        return [Found(path, {})] if strict or path.suffix.lower() == BOOK else []
+    try:
+        inside = _in_folder(path, wants)
+    except OSError as error:
+        text = message("batch_folder_unreadable", "the folder cannot be read ({reason})",
+                       reason=error.strerror or type(error).__name__)  # fmt: skip
+        log.problem(error.filename or str(path), text)
+        return []
+    if not inside and strict:
+        log.problem(str(path), _nothing_inside(wants.kind))
+    return [Found(one, {}) for one in inside]
+
+
+def _nothing_inside(kind):
+    if kind == "records":
+        return message(
+            "batch_no_records",
+            "holds no results; expected folders with record.json, such as those of tankcal run",
+        )
+    return message(
+        "batch_no_jobs",
+        "holds no job; expected job folders with job.toml, or job workbooks (.xlsx)",
+    )
+
+
+def _of_itself(path, wants):
+    """The job that a path itself is; None where it is none."""
+    if path.name == SETTINGS_FILE and path.is_file():
+        path = path.parent
+    if (path / SETTINGS_FILE).is_file():
+        if wants.kind != "records":
+            return path
+        return path / "results" / RECORD if (path / "results" / RECORD).is_file() else None
+    if path.name in SAVED and path.is_file():
+        return path
+    if wants.kind != "jobs" and path.is_dir():
+        return next((path / name for name in SAVED if (path / name).is_file()), None)
+    return (
+        path if wants.kind != "records" and path.suffix.lower() == BOOK and path.is_file() else None
+    )
+
+
+def _in_folder(folder, wants):
+    """Jobs below a folder, sorted; hidden folders, and what lies in jobs, are passed over."""
+    found = []
+
+    def fail(error):
+        raise error
+
+    for place, folders, names in os.walk(folder, onerror=fail):
+        place = Path(place)
+        if os.path.abspath(place) == wants.out:
+            folders.clear()
+            continue
+        of_batch = OUTCOME in names  # a job in the folder of another batch: its papers are no job
+        folders[:] = sorted(
+            one for one in folders if one[0] != "." and not (of_batch and one in OF_BATCH)
+        )
+        saved = [name for name in SAVED if name in names]
+        if wants.kind == "records":
+            found += [place / name for name in saved]
+        elif SETTINGS_FILE in names:
+            found.append(place)
+            folders.clear()
+        elif saved:
+            found += [place / saved[0]] if wants.kind == "either" else []
+            folders.clear()
+        else:
+            books = (place / one for one in sorted(names) if one[0] not in ".~")
+            found += [one for one in books if one.suffix.lower() == BOOK and _is_job(one)]
+    return sorted(found)
+
+
+def _is_job(book):
+    """Whether a workbook has the sheet of a job; one that cannot be looked into is told later."""
+    try:
+        with zipfile.ZipFile(book) as file:
+            sheets = file.read("xl/workbook.xml")
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile, NotImplementedError, RuntimeError):
+        return True
+    return re.search(rb'\bname="\s*%s\s*"' % SETTINGS_SHEET.encode(), sheets, re.IGNORECASE)
+
+
+# ---- lists
+
+
+def _listed(path, wants, log):
+    """The jobs of a list: a line each, or a CSV file with a column job; paths from its folder."""
+    data = read_bytes(path, log, MOST_LIST_BYTES)
+    text = None if data is None else decode(path.name, data, log)
+    if text is None:
+        return []
+    lines, told = text.splitlines(), len(log.problems)
+    rows = list(_rows(path, lines, log) if path.suffix.lower() == ".csv" else _plain_rows(lines))
+    found = []
+    for own in rows:
+        job = own.pop("job")
+        for name in OWN:  # files from the list's folder; else names, such as of a shipped rule
+            beside = path.parent / own.get(name, "")
+            if own.get(name) and (name == "former" or beside.is_file()):
+                own[name] = os.path.abspath(beside)
+        source = path.parent / job
+        inside = _in_path(source, wants, log, strict=False) or [Found(source, {})]
+        found += [Found(one.source, own) for one in inside]
+    if not found and len(log.problems) == told:
+        log.problem(path.name, message("batch_empty_list", "a list without jobs"))
+    return found
+
+
+def _plain_rows(lines):
+    stripped = (line.strip() for line in lines)
+    return [{"job": one} for one in stripped if one and not one.startswith("#")]
+
+
+def _rows(path, lines, log):
+    """A dict for each row of a CSV list; [] after telling `log` what is wrong with it."""
+    if not lines:
+        return []
+    mark = ";" if lines[0].count(";") > lines[0].count(",") else ","
+    try:
+        table = list(csv.reader(lines, delimiter=mark, strict=True))
+    except csv.Error as error:
+        text = message("batch_no_csv", "no CSV ({reason})", reason=str(error))
+        log.problem(path.name, text)
+        return []
+    headings = [one.strip() for one in table[0]]
+    wrong = [one for one in headings if one not in HEADINGS]
+    if wrong or HEADINGS[0] not in headings or len(set(headings)) < len(headings):
+        text = message(
+            "batch_headings",
+            "found the headings {found}; expected job, and maybe {others}, each once",
+            found=headings[:10],
+            others=[*HEADINGS[1:]],
+        )
+        log.problem(path.name, text, 1)
+        return []
+    return list(_dicts(path, headings, table[1:], log))
+
+
+def _dicts(path, headings, table, log):
+    for row, cells in enumerate(table, start=2):
+        if not any(cell.strip() for cell in cells):
+            continue
+        if len(cells) > len(headings):
+            text = message("batch_long_row", "{found} cells; expected at most {most}",
+                           found=len(cells), most=len(headings))  # fmt: skip
+            log.problem(path.name, text, row)
+            continue
+        own = dict(zip(headings, (cell.strip() for cell in cells), strict=False))
+        if own.get("job"):
+            yield own
+        else:
+            log.problem(
+                path.name, message("batch_no_job_cell", "blank; expected a job"), row, "job"
+            )
+
+
+# ---- names
+
+
+def _with_names(found, asked, known):
+    """`BatchJob`s, each with a name that no other one has."""
+    labels = {source: _label(one) for source, one in found.items()}
+    taken = {name.casefold(): source for source, name in known.items() if os.path.exists(source)}
+    counts = Counter(label.casefold() for label in labels.values())
+    jobs = []
+    for source, one in found.items():
+        label = labels[source]
+        owner = taken.get(label.casefold(), source)
+        name = known.get(source, label)
+        if source not in known and (counts[label.casefold()] > 1 or owner != source):
+            name = f"{label}~{sha256(source.encode(errors='replace')).hexdigest()[:DIGITS]}"
+        own = {key: value for key, value in one.own.items() if key in OWN}
+        jobs.append(BatchJob(name, label, source, asked.with_own(own)))
+    _refuse_doubles(jobs)
+    return sorted(jobs, key=lambda job: job.name)
+
+
+def _refuse_doubles(jobs):
+    names = Counter(job.name.casefold() for job in jobs)
+    double = sorted({job.name for job in jobs if names[job.name.casefold()] > 1})
+    if double:
+        text = message("batch_double_names", "two jobs are called {names}", names=double[:5])
+        raise InputError(Problem("JOBS", text))
+
+
+def _label(one):
+    """The name of a job by itself: as its list says, or of its folder or workbook."""
+    if one.own.get("name"):
+        return file_name(one.own["name"], "job")
+    path = Path(os.path.abspath(one.source))
+    if path.name not in SAVED:
+        return file_name(path.stem if path.suffix.lower() == BOOK else path.name, "job")
+    place = path.parent
+    if place.name in ("results", "comparison", "inspection"):
+        behind = "" if place.name == "results" else f"-{place.name}"
+        return file_name(place.parent.name.removesuffix("-results") + behind, "job")
+    return file_name(place.name.removesuffix("-results"), "job")

@@ -1,0 +1,152 @@
+"""What a step of a job depends on, as one SHA-256: its inputs, the version, what is asked.
+
+Of a job all files below its folder count that a job could read, of a workbook those beside it that
+it names. Too much is harmless (the job is done once more), too little would not be.
+"""
+
+import json
+import os
+import tomllib
+import zipfile
+from functools import lru_cache
+from hashlib import file_digest, sha256
+from html import unescape
+from pathlib import Path
+
+import tankcal
+from tankcal.job.folder import OF_INSPECTIONS
+from tankcal.job.tables import COVARIANCE_FILE, SETTINGS_FILE
+
+NEVER_READ = (  # endings of what lies beside jobs
+    *(".jpg", ".jpeg", ".png", ".tif", ".tiff", ".gif", ".bmp", ".dng", ".raw", ".heic"),
+    *(".mp4", ".mov", ".avi", ".pdf", ".doc", ".docx", ".odt", ".zip", ".html"),
+)
+RESULTS = frozenset(("record.json", "comparison.json", "inspection.json", SETTINGS_FILE))
+BOOK = ".xlsx"
+MOST_UNPACKED_BYTES = 300_000_000  # of a workbook that is looked through for names
+OF_STEP = {  # attributes of `Asked` that bear on a step; of files their content
+    "run": ("papers",),
+    "report": ("language",),
+    "compare": ("language",),
+    "inspect": ("language",),
+    "export": ("language",),
+}
+FILES_OF_STEP = {
+    "run": ("letterhead",),
+    "report": ("letterhead",),
+    "compare": ("compare_by", "letterhead"),
+    "inspect": ("inspect_by", "letterhead"),
+    "export": ("profile",),
+}
+
+
+def keys_of(job, former=None):
+    """{step: SHA-256} of all that bears on each step of a job.
+
+    Parameters
+    ----------
+    job : finding.BatchJob
+    former : Path, optional
+        Its former table.
+
+    Raises
+    ------
+    OSError
+        Where an input cannot be read.
+    """
+    inputs, asked = inputs_of(job.source), job.asked
+    keys = {}
+    for step in asked.do:
+        bears = {
+            "tankcal": tankcal.__version__,
+            "step": step,
+            "inputs": inputs,
+            **{name: getattr(asked, name) for name in OF_STEP[step]},
+            **{name: _content(getattr(asked, name)) for name in FILES_OF_STEP[step]},
+        }
+        if step == "run" and not asked.papers:
+            bears.pop("letterhead")
+        if step == "compare":
+            bears["former"] = None if former is None else inputs_of(former)
+        text = json.dumps(bears, sort_keys=True)
+        keys[step] = sha256(text.encode()).hexdigest()
+    return keys
+
+
+def inputs_of(source):
+    """[[name, SHA-256]] of the files that a job is read from; [] where there are none."""
+    path = Path(source)
+    if path.is_dir():
+        return [[name, _digest(path / name)] for name in _files_below(str(path))]
+    if not path.is_file():
+        return []
+    names = [path.name]
+    if path.suffix.lower() == BOOK:
+        names += _named_in_book(path)
+    elif path.suffix.lower() == ".toml":
+        names += _named_in_former(path)
+    elif path.name == "record.json" and path.with_name(COVARIANCE_FILE).is_file():
+        names.append(COVARIANCE_FILE)
+    return [[name, _digest(path.parent / name)] for name in names]
+
+
+def _files_below(folder):
+    """Names of the files below a folder that a job there could read, sorted."""
+    found = []
+    for place, folders, names in os.walk(folder):
+        if place != folder and not RESULTS.isdisjoint(names):
+            folders.clear()
+            continue
+        folders[:] = [one for one in folders if not one.startswith(".")]
+        for name in names:
+            if name[0] in ".~" or os.path.splitext(name)[1].lower() in NEVER_READ:
+                continue
+            path = os.path.join(place, name)
+            if os.path.isfile(path):
+                found.append(os.path.relpath(path, folder).replace(os.sep, "/"))
+    return sorted(found)
+
+
+_files_beside = lru_cache(maxsize=64)(_files_below)  # of folders with many workbooks
+
+
+def _named_in_book(path):
+    """Files beside a workbook that it names, and the tables of an inspection; sorted."""
+    beside = [one for one in _files_beside(str(path.parent)) if not one.lower().endswith(BOOK)]
+    if not beside:
+        return []
+    try:
+        with zipfile.ZipFile(path) as book:
+            parts = [one.filename for one in book.infolist() if one.filename.endswith(".xml")]
+            if sum(one.file_size for one in book.infolist()) > MOST_UNPACKED_BYTES:
+                return []
+            text = unescape(" ".join(book.read(one).decode(errors="replace") for one in parts))
+    except (OSError, ValueError, zipfile.BadZipFile, NotImplementedError, RuntimeError):
+        return []
+    return [one for one in beside if one in text or one in OF_INSPECTIONS]
+
+
+def _named_in_former(path):
+    """The table that a former.toml names, where it lies beside it."""
+    try:
+        name = tomllib.loads(path.read_text(encoding="utf-8"))["former"]["file"]
+        return [name] if (path.parent / name).is_file() else []
+    except (OSError, ValueError, LookupError, TypeError):
+        return []
+
+
+def _content(named):
+    """A file by its content, another name as it is."""
+    path = None if named is None else Path(named)
+    return named if path is None or not path.is_file() else _digest(path)
+
+
+def _digest(path):
+    found = os.stat(path)
+    return _digest_as_of(str(path), found.st_size, found.st_mtime_ns)
+
+
+@lru_cache(maxsize=4096)
+def _digest_as_of(path, size, mtime_ns):
+    with open(path, "rb") as file:
+        return file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,59 @@
+"""The former table of each job."""
+
+import os
+from functools import lru_cache
+from pathlib import Path
+
+from tankcal.batch.outcomes import known_names
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+
+ENDINGS = (".toml", ".csv", ".xlsx", ".pdf", ".json")
+RECORD = "record.json"
+
+
+@lru_cache(maxsize=4)
+def _names_in(folder):
+    """{source: name} of the jobs of a former batch."""
+    return known_names(folder)
+
+
+def former_or_none(job):
+    """The same; None, too, where a folder of tables has none of its name."""
+    try:
+        return former_of(job)
+    except InputError:
+        return None
+
+
+def former_of(job):
+    """Path of the former table that a job is compared with; None where it is not compared.
+
+    Raises
+    ------
+    InputError
+        Where a folder of tables has none of its name.
+    """
+    asked = job.asked
+    if "compare" not in asked.do or asked.former is None:
+        return None
+    folder = Path(os.path.abspath(asked.former))
+    if not folder.is_dir():
+        return folder
+    if (folder / RECORD).is_file():
+        return folder / RECORD
+    names = (_names_in(str(folder)).get(job.source), job.name, job.label)
+    for name in dict.fromkeys(one for one in names if one):
+        places = [folder / name, folder / "jobs" / name / "results", folder / name / "results"]
+        tables = [folder / f"{name}{ending}" for ending in ENDINGS]
+        for path in (*(one / RECORD for one in places), *tables):
+            if path.is_file():
+                return path
+    text = message(
+        "batch_no_former",
+        "no former table of {name} there; expected {name} with one of the endings {endings}, or a "
+        "folder {name} with record.json",
+        name=job.label,
+        endings=[*ENDINGS],
+    )
+    raise InputError(Problem(str(asked.former), text))

@@ -1,0 +1,136 @@
+"""What became of a job: `outcome.json` in its folder, written step by step, and its small row.
+
+Nothing in it is a time of the clock or depends on who did it: it has the same bytes however many
+workers there are. It is what a batch that was ended goes on by.
+"""
+
+import json
+import os
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from tankcal.batch.asked import FOLDERS, STEPS
+
+JOBS, FILE, FORMAT = "jobs", "outcome.json", "tankcal-outcome/1"
+STATUSES = ("done", "unsound", "refused", "failed")  # from the best to the worst
+FINAL = ("done", "unsound", "refused")  # what the same input would give again
+MOST_TOLD = 20  # problems and warnings of a step that are kept
+
+
+@dataclass(frozen=True)
+class StepOutcome:
+    """What became of one step.
+
+    Attributes
+    ----------
+    key : str
+        SHA-256 of all that it depends on.
+    status : str
+        One of STATUSES: refused for its input, without sound solution, or failed for another
+        reason, which is tried again by the next batch.
+    files : list of str
+        What it wrote, below the job's folder.
+    values : dict
+        What the summary says of it.
+    problems, warnings : list of dict
+        As `errors.problem_of` gives them, the first MOST_TOLD.
+    problem_count, warning_count : int
+        Of all.
+    """
+
+    key: str
+    status: str
+    files: list = field(default_factory=list)
+    values: dict = field(default_factory=dict)
+    problems: list = field(default_factory=list)
+    problem_count: int = 0
+    warnings: list = field(default_factory=list)
+    warning_count: int = 0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a job: its name, where it came from, {step: StepOutcome}."""
+
+    name: str
+    source: str
+    steps: dict = field(default_factory=dict)
+
+    def is_settled(self, step, key):
+        """Whether a step was done with this key, and would give the same again."""
+        known = self.steps.get(step)
+        return known is not None and known.key == key and known.status in FINAL
+
+    def status(self, steps):
+        """The worst of some steps; one that was not come to counts for nothing."""
+        found = [self.steps[one].status for one in steps if one in self.steps]
+        return max(found, key=STATUSES.index, default="failed")
+
+    def is_settled_for(self, keys):
+        """Whether nothing is left to do of {step: key}."""
+        for step, key in keys.items():
+            if not self.is_settled(step, key):
+                return False
+            if step == "run" and self.steps[step].status != "done":
+                return True  # the others would have nothing to be done with
+        return True
+
+
+def folder_of(out, name):
+    """The folder of a job in that of its batch."""
+    return Path(out) / JOBS / name
+
+
+def load_outcome(out, name):
+    """The `Outcome` in a job's folder; None where there is none that can be read."""
+    folder = folder_of(out, name)
+    try:
+        saved = json.loads((folder / FILE).read_bytes())
+        if saved.get("format") != FORMAT:
+            return None
+        steps = {step: StepOutcome(**one) for step, one in saved["steps"].items() if step in STEPS}
+        there = {step: one for step, one in steps.items() if _has_its_files(folder, step, one)}
+        return Outcome(saved["name"], saved["source"], there)
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _has_its_files(folder, step, outcome):
+    """Whether all that a step wrote is still there."""
+    return all((folder / FOLDERS[step] / name).is_file() for name in outcome.files)
+
+
+def save_outcome(out, outcome):
+    """Write it to its folder, all or nothing."""
+    steps = {one: asdict(outcome.steps[one]) for one in STEPS if one in outcome.steps}
+    saved = {"format": FORMAT, "name": outcome.name, "source": outcome.source, "steps": steps}
+    folder = folder_of(out, outcome.name)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_whole(folder / FILE, json.dumps(saved, ensure_ascii=False, indent=1) + "\n")
+
+
+def write_whole(path, text):
+    """Write a text file by way of another one that takes its place; it is on the disk then."""
+    waiting = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with waiting.open("w", encoding="utf-8", errors="replace", newline="\n") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        waiting.replace(path)
+    finally:
+        waiting.unlink(missing_ok=True)
+
+
+def known_names(out):
+    """{source: name} of the jobs that a batch's folder has."""
+    names = {}
+    try:
+        found = sorted(one.name for one in (Path(out) / JOBS).iterdir())
+    except OSError:
+        return names
+    for name in found:
+        outcome = load_outcome(out, name)
+        if outcome is not None and outcome.name == name:
+            names[outcome.source] = name
+    return names

@@ -1,0 +1,96 @@
+"""What the summary says of the files that a step wrote, and what an inspection is done with."""
+
+import json
+from collections import Counter
+from pathlib import Path
+
+from tankcal.batch.finding import RECORD, SAVED
+from tankcal.job.folder import OF_INSPECTIONS
+from tankcal.job.tables import SETTINGS_FILE
+
+VERDICTS = ("failed", "guard_band", "not_determined", "passed")  # of checks, the worst first
+
+
+def values_of(step, folder):
+    """({name: value} of the summary, warnings as plain data) of the folder that a step wrote."""
+    saved = next((folder / name for name in SAVED if (folder / name).is_file()), None)
+    if saved is None:
+        return {}, []
+    found = json.loads(saved.read_bytes())
+    return _READERS[saved.name](found), found["warnings"]
+
+
+def _of_record(record):
+    job, table, adjustment = record["job"], record["capacity"], record["adjustment"]
+    tank = job["tank"] or {}
+    values = {
+        "tank": tank.get("id"),
+        "kind": tank.get("kind"),
+        "date": (job["survey"] or {}).get("date"),
+        "global_test": adjustment["passed"] if adjustment else None,
+        "rule": record["rule"]["rule"]["name"] if record.get("rule") else None,
+        "rule_verdict": record["rule"]["code"] if record.get("rule") else None,
+    }
+    if table:
+        values |= {
+            "height_m": table["height_m"][-1],
+            "volume_m3": table["volume_m3"][-1],
+            "U_m3": table["stated_U_m3"][-1],
+        }
+    return values
+
+
+def _of_comparison(found):
+    last = found["waterfall"][-1] if found["waterfall"] else None
+    return {
+        "comparison_verdict": found["verdict"] or "none",
+        "former_m3": last and last["former_m3"],
+        "of_tank_m3": last and last["tank_m3"],
+    }
+
+
+def _of_inspection(found):
+    counts = Counter(one["verdict"] for one in found["checks"])
+    worst = next((one for one in VERDICTS if counts[one]), None)
+    return {"tank": found["tank"]["id"], "inspection_verdict": worst}
+
+
+_READERS = dict(zip(SAVED, (_of_record, _of_comparison, _of_inspection), strict=True))
+
+
+def source_of_inspection(job, results):
+    """What a job is inspected by: (source, rule or None, {settlement, edges}).
+
+    What this batch has computed of it is not computed again: the record of `results` serves, with
+    the tables of levelling and the rule that lie beside the job. But of clouds: their welds are in
+    no record.
+    """
+    record = results / RECORD
+    if "run" not in job.asked.do:
+        return job.source, None, {}
+    saved = json.loads(record.read_bytes())
+    if saved.get("clouds"):
+        return job.source, None, {}
+    path = Path(job.source)
+    folder = path if path.is_dir() else path.parent
+    levelled = {
+        name: folder / file if (folder / file).is_file() else None
+        for name, file in zip(("settlement", "edges"), OF_INSPECTIONS, strict=True)
+    }
+    rule = (saved["job"].get("inspection") or {}).get("rule")
+    is_file = rule is not None and rule.lower().endswith(".toml")
+    return record, str(folder / rule) if is_file else None, levelled
+
+
+def language_of(source):
+    """The language that the job of a record, or a job, asks for; None where none can be read."""
+    path = Path(source)
+    if path.name in SAVED:
+        try:
+            return json.loads(path.read_bytes())["job"]["table"]["language"]
+        except (OSError, ValueError, LookupError, TypeError):
+            return None
+    import tankcal
+
+    job = tankcal.load(path.parent if path.name == SETTINGS_FILE else path)
+    return job.table.language

@@ -1,0 +1,272 @@
+"""A batch as a whole: what is left to do is done, by workers of dask or in this process.
+
+Only a few jobs at a time are with the scheduler, and of each comes back one small row: however many
+jobs there are, neither the scheduler nor this process holds their results.
+"""
+
+import contextlib
+import os
+import queue
+import uuid
+from collections import Counter
+from dataclasses import dataclass, field, replace
+
+from tankcal.batch import asked as asking
+from tankcal.batch.doing import Task, do_job
+from tankcal.batch.finding import find_jobs
+from tankcal.batch.fingerprints import keys_of
+from tankcal.batch.formers import former_or_none
+from tankcal.batch.journal import opened_folder
+from tankcal.batch.outcomes import (
+    Outcome,
+    StepOutcome,
+    known_names,
+    load_outcome,
+    save_outcome,
+)
+from tankcal.batch.summary import write_summary
+from tankcal.errors import Problem, problem_of
+from tankcal.messages import message
+from tankcal.pipeline.cluster import Watch, count_cores, failures_told, is_installed, open_client
+
+TRIES = 3  # of a job whose worker dies while it is computed
+MOST_DEATHS = 12  # of workers that a job was given to, begun or not
+AHEAD = 2  # jobs of each worker that are with the scheduler
+LOOK_S = 1.0  # between looks at whether there are workers at all
+WORKER_BYTES = 2 << 30
+ALLOWED_FAILURES = "distributed.scheduler.allowed-failures"
+
+
+@dataclass(frozen=True)
+class Telling:
+    """Who is told how far a batch is.
+
+    step(text), part(text, done, total)     as of `tankcal.run`
+    ended(name, status, problems, count)    each job that is not done
+    """
+
+    step: object = lambda text: None
+    part: object = lambda text, done, total: None
+    ended: object = lambda name, status, problems, count: None
+
+
+@dataclass
+class Batch:
+    """What became of a batch.
+
+    Attributes
+    ----------
+    counts : Counter
+        Jobs by status.
+    total, skipped : int
+        Jobs; those of them that were settled before.
+    rows : list of dict
+        Of the summary.
+    files : list of Path
+        Of the summary.
+    """
+
+    counts: Counter = field(default_factory=Counter)
+    total: int = 0
+    skipped: int = 0
+    rows: list = field(default_factory=list)
+    files: list = field(default_factory=list)
+
+    @property
+    def exit_status(self):
+        """0: all done; 2: some were refused or failed; 3: some have no sound solution."""
+        if self.counts["refused"] or self.counts["failed"]:
+            return 2
+        return 3 if self.counts["unsound"] else 0
+
+
+def run_batch(arguments, asked, out, *, workers="local", worker_bytes=WORKER_BYTES,
+              language="en", telling=None):  # fmt: skip
+    """Do what is asked with each job that is not settled, and write the summary of all.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        As of `finding.find_jobs`.
+    asked : asked.Asked
+    out : path
+        Folder of the batch.
+    workers : "local", int or str
+        A worker for each core, so many (0: none, this process does it), or the address of a
+        scheduler of dask.
+    worker_bytes : int
+        Of memory that a worker of this machine may take.
+    language : str
+        Of the summary.
+    telling : Telling, optional
+
+    Returns
+    -------
+    Batch
+
+    Raises
+    ------
+    InputError
+        For arguments that name no job, options that no job could be done with, a folder of somebody
+        else or of a batch that runs; a cluster that does not answer. What was done stays.
+    OSError
+        Where the folder takes no more. What was done stays.
+    """
+    telling, out = telling or Telling(), os.path.abspath(out)
+    asking.refuse_unreadable(asked)
+    telling.step(message("batch_looking", "looking for jobs"))
+    jobs = find_jobs(arguments, asked, out, known_names(out))
+    asking.refuse_incomplete(asked, jobs)
+    with opened_folder(out) as journal:
+        batch = Batch(total=len(jobs))
+        waiting = list(_unsettled(jobs, journal, batch, telling))
+        if waiting:
+            _do(waiting, journal, batch, telling, _workers_for(workers, waiting), worker_bytes)
+        batch.rows, batch.files = write_summary(out, jobs, language)
+        return batch
+
+
+def _workers_for(workers, waiting):
+    """Number of workers of this machine, 0: none; or an address."""
+    if workers == "local":
+        return min(count_cores(), len(waiting)) if is_installed() and len(waiting) > 1 else 0
+    return workers
+
+
+def _unsettled(jobs, journal, batch, telling):
+    """A `Task` of each job with something left to do; the others are counted as they were."""
+    text = message("batch_comparing", "looking at what is done already")
+    for number, job in enumerate(jobs):
+        telling.part(text, number, len(jobs))
+        task = Task(job, {}, str(journal.out), journal.run)
+        try:
+            task = replace(task, keys=keys_of(job, former_or_none(job)))
+        except OSError as error:
+            text = message("batch_input_unreadable", "cannot be read ({reason})",
+                           reason=error.strerror or str(error))  # fmt: skip
+            found = fail_job(task, Problem(str(error.filename or job.source), text))
+            batch.counts[found[0]] += 1
+            telling.ended(job.name, *found)
+            continue
+        known = load_outcome(journal.out, job.name)
+        if known is not None and known.is_settled_for(task.keys):
+            status = known.status(job.asked.do)
+            batch.skipped += 1
+            batch.counts[status] += 1
+            if status != "done":
+                _tell_known(known, job, status, telling)
+        else:
+            yield task
+
+
+def _tell_known(outcome, job, status, telling):
+    steps = [outcome.steps[one] for one in job.asked.do if one in outcome.steps]
+    problems = [one for step in steps for one in step.problems]
+    telling.ended(job.name, status, problems[:1], sum(one.problem_count for one in steps))
+
+
+def _do(waiting, journal, batch, telling, workers, worker_bytes):
+    """All tasks, one after the other or by workers."""
+    text = message("batch_doing", "jobs done")
+
+    def ended(task, status, problems, count):
+        batch.counts[status] += 1
+        if status != "done":
+            telling.ended(task.job.name, status, problems, count)
+        telling.part(text, sum(batch.counts.values()), batch.total)
+
+    telling.part(text, sum(batch.counts.values()), batch.total)
+    if workers == 0:
+        for task in waiting:
+            ended(task, *do_job(task))
+        return
+    settings = {ALLOWED_FAILURES: 0}  # how many times it is tried is decided here
+    with open_client(workers, worker_bytes=worker_bytes, settings=settings) as client:
+        _ByWorkers(client, journal, ended).do(waiting)
+
+
+class _ByWorkers:
+    """Tasks by workers: a few with the scheduler, the next one when one has ended."""
+
+    def __init__(self, client, journal, ended):
+        self._client, self._journal, self._tell_ended = client, journal, ended
+        self._watch, self._running, self._ended = Watch(client), {}, queue.SimpleQueue()
+        self._deaths = Counter()
+
+    def do(self, waiting):
+        """All of them; raises what stops a batch as a whole."""
+        left = iter(waiting)
+        try:
+            self._fill(left)
+            while self._running:
+                try:
+                    future = self._ended.get(timeout=LOOK_S)
+                except queue.Empty:
+                    self._fill(left)  # there may be more workers now, or none
+                else:
+                    self._take(future)
+                    self._submit_some(left, 1)
+        finally:
+            with contextlib.suppress(Exception):  # of a scheduler that is gone
+                self._client.cancel(list(self._running))
+
+    def _fill(self, left):
+        with failures_told():
+            workers = max(self._watch.look(), 1)
+        self._submit_some(left, AHEAD * workers - len(self._running))
+
+    def _submit_some(self, left, most):
+        for _ in range(most):
+            if (task := next(left, None)) is not None:
+                self._submit(task)
+
+    def _submit(self, task):
+        key = f"tankcal_job-{uuid.uuid4().hex}"  # one group for the scheduler, whatever the job
+        with failures_told():
+            future = self._client.submit(do_job, task, key=key, pure=False)
+        self._running[future] = task
+        future.add_done_callback(self._ended.put)
+
+    def _take(self, future):
+        """The row of a task that has ended; one whose worker died is given to another."""
+        from distributed.scheduler import KilledWorker
+
+        task = self._running.pop(future)
+        with failures_told():
+            error = future.exception()
+            if error is not None and not isinstance(error, KilledWorker):
+                raise error
+            found = None if error else future.result()
+            future.release()
+        if found is not None:
+            self._tell_ended(task, *found)
+        elif self._is_tried_again(task):
+            self._submit(task)
+        else:
+            text = message(
+                "batch_killer",
+                "its worker ended {count} times while it was computed: out of memory? "
+                "--worker-memory gives more",
+                count=TRIES,
+            )
+            self._tell_ended(task, *fail_job(task, Problem(task.job.name, text)))
+
+    def _is_tried_again(self, task):
+        """Whether a job may have been beside the one that ended a worker, or that by chance."""
+        self._deaths[task.job.name] += 1
+        return (
+            self._journal.deaths(task.job.name) < TRIES
+            and self._deaths[task.job.name] < MOST_DEATHS
+        )
+
+
+def fail_job(task, problem):
+    """Note in a job's outcome why it could not be done; what is given as of `do_job`."""
+    plain = problem_of(problem)
+    known = load_outcome(task.out, task.job.name) or Outcome(task.job.name, task.job.source)
+    step = next(
+        one for one in task.job.asked.do if not known.is_settled(one, task.keys.get(one, ""))
+    )
+    made = StepOutcome(task.keys.get(step, ""), "failed", problems=[plain], problem_count=1)
+    save_outcome(task.out, replace(known, steps={**known.steps, step: made}))
+    return "failed", [plain], 1

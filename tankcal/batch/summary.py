@@ -1,0 +1,135 @@
+"""The summary of a batch: a row of each job, what changed since the last one; its files.
+
+No time of the clock is in it, nor who did what: the same jobs give the same bytes, whatever the
+number of workers and however often the batch was ended and went on.
+"""
+
+import json
+import tempfile
+from pathlib import Path
+
+import tankcal
+from tankcal.batch.asked import FOLDERS
+from tankcal.batch.outcomes import JOBS, load_outcome
+from tankcal.report.batch import JSON, summary_files
+
+VALUES = (
+    *("tank", "kind", "date", "height_m", "volume_m3", "U_m3", "global_test", "rule"),
+    *("rule_verdict", "comparison_verdict", "inspection_verdict"),
+)
+VERDICTS = ("global_test", "rule_verdict", "comparison_verdict", "inspection_verdict")
+PAPERS = (  # of each job the first of these is the one that the summary leads to
+    *("certificate.pdf", "report.pdf", "comparison.pdf", "inspection.pdf", "capacity.xlsx"),
+    *("capacity.csv", "record.json"),
+)
+MOST_TOLD = 1  # problem or warning of a job
+
+
+def write_summary(out, jobs, language):
+    """Write the summary of the jobs into the folder of their batch.
+
+    Parameters
+    ----------
+    out : path
+    jobs : list of finding.BatchJob
+    language : str
+
+    Returns
+    -------
+    rows : list of dict
+    files : list of Path
+    """
+    out = Path(out)
+    former = _former_rows(out / JSON)
+    rows = []
+    for job in jobs:
+        row = _row(out, job)
+        row["changes"] = None if former is None else changes_of(row, former.get(job.name))
+        rows.append(row)
+    names = {row["name"] for row in rows}
+    steps = dict.fromkeys(step for job in jobs for step in job.asked.do)
+    found = {
+        "format": "tankcal-batch/1",
+        "tankcal": tankcal.__version__,
+        "do": [*steps],
+        "rows": rows,
+        "gone": sorted(set(former or ()) - names),
+    }
+    with tempfile.TemporaryDirectory(prefix=".tankcal-", dir=out / JOBS) as folder:
+        files = summary_files(found, language, Path(folder))
+        for name in files:
+            (Path(folder) / name).replace(out / name)
+    return rows, [out / name for name in files]
+
+
+def _former_rows(path):
+    """{name: row} of the last summary; None where there is none that can be read."""
+    try:
+        rows = json.loads(path.read_bytes())["rows"]
+        return {row["name"]: row for row in rows}
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return None
+
+
+def _row(out, job):
+    """What the summary says of one job: by its outcome alone."""
+    outcome, steps = load_outcome(out, job.name), job.asked.do
+    row = {"name": job.name, "source": job.source, "status": "failed", **dict.fromkeys(VALUES)}
+    problems, warnings, papers, counts = [], [], [], [0, 0]
+    for step in () if outcome is None else steps:
+        done = outcome.steps.get(step)
+        if done is None:
+            continue
+        row |= {key: done.values[key] for key in VALUES if done.values.get(key) is not None}
+        problems += done.problems[:MOST_TOLD]
+        warnings += done.warnings[:MOST_TOLD]
+        counts[0] += done.problem_count
+        counts[1] += done.warning_count
+        papers += [f"{JOBS}/{job.name}/{FOLDERS[step]}/{one}" for one in done.files]
+    if outcome is not None:
+        row["status"] = outcome.status(steps)
+    best = [one for name in PAPERS for one in papers if one.endswith(f"/{name}")]
+    return row | {
+        "problems": problems[:MOST_TOLD],
+        "problem_count": counts[0],
+        "warnings": warnings[:MOST_TOLD],
+        "warning_count": counts[1],
+        "papers": [*best, *(one for one in papers if one not in best)][:1],
+    }
+
+
+def changes_of(row, former):
+    """What is otherwise than in the row of the last batch.
+
+    Parameters
+    ----------
+    row, former : dict
+        former None: the job was not there.
+
+    Returns
+    -------
+    list of dict
+        {"code", ...}: "first"; "status" and verdicts with "old" and "new"; "height_m"; "volume_m3"
+        with "by_m3" and "U_m3", the larger of both U.
+
+    Examples
+    --------
+    >>> from tankcal.batch.summary import changes_of
+    >>> row = {"status": "done", "height_m": 9.5, "volume_m3": 100.5, "U_m3": 0.2}
+    >>> changes_of(row, row | {"volume_m3": 100.25})
+    [{'code': 'volume_m3', 'by_m3': 0.25, 'U_m3': 0.2}]
+    """
+    if former is None:
+        return [{"code": "first"}]
+    changes = []
+    for key in ("status", *VERDICTS):
+        old, new = former.get(key), row.get(key)
+        if old != new:
+            changes.append({"code": key, "old": old, "new": new})
+    if former.get("height_m") != row.get("height_m"):
+        changes.append({"code": "height_m"})
+    volumes = [one.get("volume_m3") for one in (former, row)]
+    if None not in volumes and volumes[0] != volumes[1]:
+        most = max(former.get("U_m3") or 0.0, row.get("U_m3") or 0.0)
+        changes.append({"code": "volume_m3", "by_m3": volumes[1] - volumes[0], "U_m3": most})
+    return changes
