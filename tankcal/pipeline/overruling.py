@@ -138,7 +138,8 @@ class _Attempt:
             return NO_SOLUTION, np.nan, np.nan
         if one.table is not None:
             return self._of_reading(one)
-        names = self.found.job.points.names
+        points = self.found.job.points
+        names = () if points is None else points.names
         if one.point not in names:
             return NO_SOLUTION, np.nan, np.nan
         return _states(self.found)[names.index(one.point)]

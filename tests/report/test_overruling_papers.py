@@ -132,3 +132,11 @@ def test_all_papers(folder, result, tmp_path):
     html = (out / "report.html").read_text(encoding="utf-8")
     assert "<b>&quot;seen" not in html
     assert "Decisions against the search for blunders" in html
+
+
+def test_the_digital_certificate_states_each(record):
+    from tankcal.report.dcc import certificate_xml
+
+    text = certificate_xml(record, digest="0" * 64).decode("utf-8")
+    assert text.count("tankcal_overruling") == 2
+    assert "dent: mantido, diga o que disser a busca" in text
