@@ -119,27 +119,47 @@ def with_decided_readings(measurements, overrulings):
 
 
 def refuse_kept_readings(job, adjustment):
-    """Raise InputError for kept readings that are none of their own in the adjustment."""
+    """Raise InputError for kept readings that are none of their own in the adjustment, or whose
+    point the search left without the others.
+    """
     found = {(one.file, one.row) for one in adjustment.readings}
     files = {one.table: one.file for one in job.measurements.readings if _is_own(one, one.table)}
     if job.measurements.image_points is not None:
         files["image_points"] = job.measurements.image_points.file
     problems = []
     for one in job.overrulings:
-        if one.table is None or (files.get(one.table), one.reading_row) in found:
+        place = files.get(one.table), one.reading_row
+        if one.table is None or not one.is_kept or place in found:
             continue
-        if not one.is_kept:
-            continue
-        text = message(
-            "kept_no_reading",
-            "found row {row} of {table}; it was not adjusted by itself: expected the first of the"
-            " readings that were averaged with it, of points that are adjusted",
-            row=one.reading_row,
-            table=one.table,
-        )
+        text = _not_adjusted(one, is_tried=place in _tried(adjustment.adjusted.survey))
         problems.append(Problem(one.file, text, one.row, "row"))
     if problems:
         raise InputError(problems)
+
+
+def _tried(survey):
+    """{(file, row)} of all readings that an adjustment began with."""
+    traces = [one.trace for one in survey.tables.values() if one.trace is not None]
+    return {(trace.file, row) for trace in traces for row in trace.rows}
+
+
+def _not_adjusted(one, *, is_tried):
+    """What is said of a kept reading that was not adjusted."""
+    if is_tried:
+        return message(
+            "kept_point_lost",
+            "found keep for row {row} of {table}, but the search set so many others of its point"
+            " aside that it is no longer adjusted; expected to keep those, too, or not this one",
+            row=one.reading_row,
+            table=one.table,
+        )
+    return message(
+        "kept_no_reading",
+        "found row {row} of {table}; it was not adjusted by itself: expected the first of the"
+        " readings that were averaged with it, of points that are adjusted",
+        row=one.reading_row,
+        table=one.table,
+    )
 
 
 def _is_own(of, name):

@@ -138,7 +138,8 @@ class _Attempt:
             return NO_SOLUTION, np.nan, np.nan
         if one.table is not None:
             return self._of_reading(one)
-        names = self.found.job.points.names
+        points = self.found.job.points
+        names = () if points is None else points.names
         if one.point not in names:
             return NO_SOLUTION, np.nan, np.nan
         return _states(self.found)[names.index(one.point)]
@@ -221,15 +222,15 @@ def _outrageous(one):
     if np.isnan(one.off_m):
         return message(
             "kept_outrageous_reading",
-            "{what} was kept, but contradicts all others (w = {w:.1f}): if it is wrong after all,"
-            " the volumes are wrong by more than U says",
+            "{what} was kept, but contradicts all others (w = {w:.1f}): U holds only if it is"
+            " right; the certificate says by how much it moves the volume",
             what=one.decision.what,
             w=one.w,
         )
     return message(
         "kept_outrageous",
-        "{what} was kept, but stands {off_mm:.0f} mm off the wall that the others show: if it is"
-        " not wall after all, the volumes are wrong by more than U says",
+        "{what} was kept, but stands {off_mm:.0f} mm off the wall that the others show: U holds"
+        " only if it is wall; the certificate says by how much it moves the volume",
         what=one.decision.what,
         off_mm=1000 * one.off_m,
     )

@@ -205,3 +205,32 @@ def test_nozzle_and_stair_are_rejected_with_unequal_rings():
     found = find_shell(np.vstack([wall_points, stair, rim]), JOINTS, 6.5)
     assert np.all(found.reason[-12:] == "snooping")
     assert np.sum(found.reason[:-12] != "") <= 2
+
+
+def test_what_was_decided_beforehand():
+    """Property: a kept point stays and is still tested, one left out is none of the search's."""
+    xyz = wall(np.random.default_rng(3))
+    away = np.array([36.46, 20.0, 5.0])  # 40 mm inside
+    every = np.vstack([xyz, away])
+    decided = np.zeros(len(every), dtype=int)
+    alone = find_shell(every, JOINTS, 6.5)
+    assert alone.reason[-1] == "snooping"
+    decided[-1] = 1
+    kept = find_shell(every, JOINTS, 6.5, decided=decided)
+    assert kept.reason[-1] == ""
+    assert kept.on_wall[-1]
+    assert abs(kept.w[-1]) > 3.29
+    assert np.array_equal(kept.reason[:-1], alone.reason[:-1])
+    decided[-1] = -1
+    left, without = find_shell(every, JOINTS, 6.5, decided=decided), find_shell(xyz, JOINTS, 6.5)
+    assert left.reason[-1] == "overruled"
+    assert np.array_equal(left.reason[:-1], without.reason)
+    assert left.axis_m == pytest.approx(without.axis_m, abs=1e-9)
+    assert left.residual_m[:-1] == pytest.approx(without.residual_m, abs=1e-7)
+
+
+def test_nothing_decided_is_the_search_alone():
+    xyz = wall(np.random.default_rng(4))
+    nothing = np.zeros(len(xyz), dtype=int)
+    found = [find_shell(xyz, JOINTS, 6.5, decided=one) for one in (None, nothing)]
+    assert np.array_equal(found[0].residual_m, found[1].residual_m)

@@ -261,3 +261,17 @@ def test_a_kept_reading_that_was_not_adjusted_is_refused():
     with pytest.raises(InputError) as caught:
         tankcal.adjust_job(replace(job, overrulings=(of_reading("directions", 9999, "keep"),)))
     assert caught.value.problems[0].expected.code == "kept_no_reading"
+
+
+@pytest.mark.slow
+def test_a_kept_reading_whose_point_is_lost_by_it_is_refused():
+    # 0.3 mm in the image: the other rays of its point go, one after another
+    job = tankcal.load(EXAMPLES / "silva-1995-photos", only="adjustment")
+    images = job.measurements.image_points
+    spoilt = images.xy_mm.copy()
+    spoilt[25, 0] += 0.3
+    measured = replace(job.measurements, image_points=replace(images, xy_mm=spoilt))
+    kept = of_reading("image_points", images.rows[25], "keep")
+    with pytest.raises(InputError) as caught:
+        tankcal.adjust_job(replace(job, measurements=measured, overrulings=(kept,)))
+    assert caught.value.problems[0].expected.code == "kept_point_lost"

@@ -135,3 +135,75 @@ def test_deadwood_of_unknown_uncertainty_shares_one_error(tmp_path):
     assert abs(shared.columns_m3[-1, 0]) == pytest.approx(0.6 * 0.05 / 3**0.5)
     own = [s for s in result.table.sources if s.kind == "deadwood" and not s.is_default]
     assert [abs(s.columns_m3[-1, 0]) for s in own] == [pytest.approx(0.05)]
+
+
+def lines_of(r=0.0, dof=(9.0, 4.0, np.inf)):
+    """A budget of three causes, the first two correlated."""
+    alone = {
+        "a": source("a", 0, 3, 5, dof=dof[0]),
+        "b": source("b", 0, 2, -4, dof=dof[1]),
+        "c": source("c", 0, 1, 2, dof=dof[2]),
+    }
+    return table(*group_correlated(alone, [("a", "b", r)] if r else ()))
+
+
+@pytest.mark.parametrize("r", [-0.9, 0.0, 0.5, 1.0])
+@pytest.mark.parametrize("low", [None, 0.4])
+def test_factors_of_one_change_nothing(r, low):
+    # property: to 1e-12
+    capacity = lines_of(r)
+    as_it_is, supposed = (budget(capacity, 1.7, low, factors=f) for f in (None, [1.0] * 3))
+    for name in ("u_m3", "U_m3", "k", "dof", "table_u_m3"):
+        assert getattr(supposed, name) == pytest.approx(getattr(as_it_is, name), rel=1e-12)
+    for name in ("share", "contribution", "halved", "u"):
+        before, after = ([getattr(one, name) for one in b.lines] for b in (as_it_is, supposed))
+        assert after == pytest.approx(before, rel=1e-12)
+
+
+@pytest.mark.parametrize("r", [-0.9, 0.0, 0.5, 1.0])
+@pytest.mark.parametrize("line", [0, 1, 2])
+def test_half_of_a_u_is_what_the_line_says_of_it(r, line):
+    """Second method: `halved` of the line is computed from variances, not from columns."""
+    capacity, factors = lines_of(r), [1.0, 1.0, 1.0]
+    factors[line] = 0.5
+    now, then = budget(capacity, 2.0), budget(capacity, 2.0, factors=factors)
+    assert then.U_m3 / now.U_m3 == pytest.approx(now.lines[line].halved, rel=1e-12)
+    assert then.lines[line].u == pytest.approx(0.5 * now.lines[line].u)
+    assert then.lines[line].dof == now.lines[line].dof
+
+
+@pytest.mark.parametrize("factors", [(0.0, 2.0, 3.0), (0.5, 0.5, 0.5), (3.0, 0.0, 0.1)])
+def test_factors_of_correlated_inputs_are_those_of_propagation(factors):
+    """Second method: the same inputs with other u through `propagate`."""
+    found = budget(lines_of(0.5, (9.0, 9.0, 9.0)), 2.0, factors=factors)
+    given = [Input(n, standard(f, dof=9.0)) for n, f in zip("abc", factors, strict=True) if f]
+    slopes = [s for s, f in zip((5.0, -4.0, 2.0), factors, strict=True) if f]
+    pairs = {("a", "b"): 0.5} if factors[0] and factors[1] else {}
+    model = propagate(lambda x: sum(s * one for s, one in zip(slopes, x, strict=True)),
+                      Inputs(given, pairs))  # fmt: skip
+    assert found.u_m3 == pytest.approx(model.u[0], rel=1e-9)
+    assert found.dof == pytest.approx(model.dof[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("factors", [[1.0], [1.0] * 4, [1.0, 1.0, -0.1], [1, 1, np.nan]])
+def test_factors_that_fit_no_budget_are_refused(factors):
+    with pytest.raises(ValueError, match="expected 3 factors"):
+        budget(lines_of(), 2.0, factors=factors)
+
+
+@pytest.mark.slow
+def test_a_supposed_u_is_that_of_a_run_with_it(tmp_path):
+    """Second method: the job once more with that u halved in uncertainty.csv, line by line."""
+    given = [("scale", 40.0, "ppm"), ("datum", 1.0, "mm"), ("offset", 2.0, "mm")]
+    result = run(tmp_path / "as-it-is", uncertainty=given)
+    names = [one.name for one in result.budget().lines]
+    for number, (name, u, unit) in enumerate(given):
+        rows = [*given[:number], (name, u / 2, unit), *given[number + 1 :]]
+        halved = run(tmp_path / name, uncertainty=rows).budget()
+        factors = [0.5 if one == name else 1.0 for one in names]
+        supposed = result.budget(factors=factors)
+        assert supposed.U_m3 == pytest.approx(halved.U_m3, rel=1e-12)
+        assert supposed.dof == pytest.approx(halved.dof, rel=1e-9) or np.isinf(supposed.dof)
+        assert [one.share for one in supposed.lines] == pytest.approx(
+            [one.share for one in halved.lines], abs=1e-12
+        )

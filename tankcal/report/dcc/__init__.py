@@ -41,7 +41,8 @@ def certificate_xml(record, digest, language=None):
     """
     first = language or language_of(record)
     order = [first, *(one for one in LANGUAGES if one != first)]
-    groups = None if record["warnings"] or record["adjustment"] else _GROUPS
+    told = record["warnings"] or record["adjustment"] or record.get("overrulings")
+    groups = None if told else _GROUPS
     tongues = Tongues(record, [load_words(one, groups) for one in order])
     root = root_of(CERTIFICATE)
     administrative_data(child(root, "administrativeData"), tongues, digest)

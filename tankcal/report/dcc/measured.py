@@ -20,6 +20,7 @@ from tankcal.report.dcc.elements import (
     state_uncertainty,
     words_list,
 )
+from tankcal.report.tables import overrulings
 from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
 
 _UNITS = {  # by the unit that a size is shown in; its value is in SI, but of an angle in degrees
@@ -229,13 +230,16 @@ def _thing(parent, tongues, thing):
 
 
 def _meta_data(parent, tongues, digest):
-    """The record and the files that it was made of, by their hashes; what was assumed; warnings."""
+    """The record and the files that it was made of, by their hashes; then what is told."""
     made = {"file": "record.json", "sha256": digest}
     _file(parent, tongues.word("dcc.record"), made, "tankcal_record")
     for one in tongues.record["files"]:
         _file(parent, tongues.word("dcc.input_file"), one, "tankcal_inputFile")
     choices = tongues.each(lambda paper: " ".join(paper.choices()))
     _said(parent, tongues.word("headings.choices"), choices, "tankcal_assumptions")
+    for number in range(len(overrulings.decisions_of(tongues.record))):
+        told = tongues.each(lambda paper, at=number: overrulings.sentences(paper)[at])
+        _said(parent, tongues.word("headings.overrulings"), told, "tankcal_overruling")
     for number in range(len(tongues.record["warnings"])):
         told = tongues.each(lambda paper, at=number: _warning(paper.record["warnings"][at]))
         _said(parent, tongues.word("headings.warnings"), told, "tankcal_warning")

@@ -42,6 +42,12 @@ OVERRULINGS = Table(
 )
 
 
+def decisions_of(record):
+    """The decisions of a record; [] where there are none."""
+    found = record.get("overrulings")
+    return found["each"] if found else []
+
+
 def sentences(paper):
     """What the certificate states of each decision, then what they change together."""
     found = paper.record.get("overrulings")
