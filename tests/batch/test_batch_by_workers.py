@@ -12,6 +12,7 @@ import sys
 import threading
 
 import pytest
+from background import heed_ctrl_c
 from batch_jobs import (
     DEADLY,
     bytes_of,
@@ -121,7 +122,7 @@ def start(site, out, *more):
     command = [sys.executable, "-c", BATCH, "batch", str(site / "jobs"), "--out", str(out),
                "--no-papers", "--quiet", *more]  # fmt: skip
     return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL,
-                            text=True, start_new_session=True)  # fmt: skip
+                            text=True, start_new_session=True, preexec_fn=heed_ctrl_c)  # fmt: skip
 
 
 def ended(out):

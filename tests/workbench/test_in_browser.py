@@ -12,6 +12,7 @@ import time
 from contextlib import contextmanager
 
 import pytest
+from background import heed_ctrl_c
 from browser import THIS_MACHINE, Browser
 from job_builder import write_job
 
@@ -32,6 +33,7 @@ def served(*command, **beside):
         text=True,
         env=environment,
         start_new_session=True,
+        preexec_fn=heed_ctrl_c,
     )
     lines = []
     try:

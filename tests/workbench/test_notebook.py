@@ -8,10 +8,11 @@ from pathlib import Path
 import nbformat
 import pytest
 from job_builder import write_job, write_workbook
+from nbclient import NotebookClient
+from nbclient.exceptions import CellExecutionError
 
 import tankcal
 from tankcal.cli import main
-from tankcal.report.notebook import execute
 from tankcal.text.languages import LANGUAGES
 from tankcal.workbench.notebook_file import make_notebook
 
@@ -188,14 +189,19 @@ def test_papermill_writes_the_papers_of_another_job(folder, tmp_path):
     assert (out / "certificate.pdf").exists()
 
 
+def executed(notebook, folder):
+    """By a kernel, as nbconvert does it."""
+    NotebookClient(notebook, resources={"metadata": {"path": str(folder)}}).execute()
+
+
 @pytest.mark.slow
 def test_a_bad_job_stops_the_notebook(folder):
     main(["notebook", str(folder), "--no-open"])
     courses = folder / "courses.csv"
     courses.write_text(courses.read_text().replace("1.9", "abc", 1))
     notebook = nbformat.read(folder / "tankcal.ipynb", as_version=4)
-    with pytest.raises(tankcal.TankcalError, match=r"Refusal.*courses\.csv, row 2, height_m"):
-        execute(notebook, folder)
+    with pytest.raises(CellExecutionError, match=r"Refusal.*courses\.csv, row 2, height_m"):
+        executed(notebook, folder)
     shown = str([cell.outputs for cell in notebook.cells if cell.cell_type == "code"])
     assert "Traceback" not in shown
     assert not (folder / "results").exists()
@@ -206,5 +212,5 @@ def test_total_station_is_executed_like_the_others(tmp_path):
     notebook = tmp_path / "n.ipynb"
     made = make_notebook(EXAMPLES / "total-station", notebook, "pt-BR")
     made["cells"][1]["source"] += f"\nOUT = {str(tmp_path / 'out')!r}"
-    execute(nbformat.from_dict(made), tmp_path)
+    executed(nbformat.from_dict(made), tmp_path)
     assert same_record(tmp_path / "out" / "record.json", EXAMPLES / "total-station") == []
