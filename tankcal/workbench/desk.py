@@ -272,19 +272,20 @@ class Desk:
 
         draft, name = self.draft, "overrulings"
         columns = ("point", "decision", "reason", "date")
-        if name not in draft.tables:
-            draft.add_table(name, columns)
-        for column in columns:
-            draft.add_column(name, column)
-        table = draft.tables[name]
-        column = table.headings.index("point")
-        known = [row.cells[column] for row in table.rows]
-        row = known.index(point) if point in known else len(known)
-        if row == len(known):
-            draft.insert_rows(name, row)
         given = {"point": point, "decision": decision, "reason": reason}
         given["date"] = datetime.date.today().isoformat()
-        draft.set_cells(name, [(row, *one) for one in given.items()])
+        with draft.as_one_edit():
+            if name not in draft.tables:
+                draft.add_table(name, columns)
+            for column in columns:
+                draft.add_column(name, column)
+            table = draft.tables[name]
+            column = table.headings.index("point")
+            known = [row.cells[column] for row in table.rows]
+            row = known.index(point) if point in known else len(known)
+            if row == len(known):
+                draft.insert_rows(name, row)
+            draft.set_cells(name, [(row, *one) for one in given.items()])
         self.changed()
 
     @property

@@ -9,7 +9,7 @@ draft.save()
 import hashlib
 import os
 import tempfile
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
@@ -34,6 +34,7 @@ FORMULAS = message(
     "has formulas in the sheets of the job; edit it in Excel or LibreOffice, for their values "
     "would be lost here",
 )
+KEPT_EDITS = 200  # that Undo takes back
 
 
 def source_of(path):
@@ -243,7 +244,19 @@ class Draft:
         if self.locked is not None:
             raise InputError(Problem(self.source.name, self.locked))
         self._before.append((dict(self.tables), dict(self.keys)))
-        del self._before[:-200]
+        del self._before[:-KEPT_EDITS]
+
+    @contextmanager
+    def as_one_edit(self):
+        """What is edited within is one edit, which Undo takes back at once; all of it or nothing."""
+        state, before = (dict(self.tables), dict(self.keys)), [*self._before]
+        try:
+            yield
+        except BaseException:
+            (self.tables, self.keys), self._before = state, before
+            raise
+        if self._before and (not before or self._before[-1] is not before[-1]):
+            self._before = [*before, state][-KEPT_EDITS:]
 
     def undo(self):
         """Take the last edit back; False: there is none."""

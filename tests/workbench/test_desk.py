@@ -259,6 +259,44 @@ def test_overruling_is_noted_in_the_job(folder, tmp_path):
     assert len(result.accepted) == len(result.job.points.names) - 1
 
 
+def test_overruling_in_a_new_job_of_decimal_commas(folder):
+    """The table as tankcal new wrote it, its heading with commas, where the job has semicolons."""
+    for path in folder.glob("*.csv"):
+        path.write_text(path.read_text().replace(",", ";").replace(".", ","))
+    with (folder / "job.toml").open("a") as file:
+        file.write('\n[csv]\nseparator = ";"\ndecimal = ","\n')
+    noted = folder / "overrulings.csv"
+    noted.write_text("# decisions\npoint,table,row,decision,reason,by,date\n")
+    made = open_job(folder, live=False)
+    assert [one.name for one in made.show("overrulings").columns][:3] == ["point", "table", "row"]
+    name = made.draft.tables["points"].rows[3].cells[0]
+    made.overrule(name, "leave_out", "a clamp; seen")
+    assert made.problems[:] == ()
+    made.save()
+    lines = noted.read_text().splitlines()
+    assert lines[:2] == ["# decisions", "point;table;row;decision;reason;by;date"]
+    assert lines[2].startswith(f'{name};;;leave_out;"a clamp; seen";;2')
+
+
+def test_what_was_done_at_once_is_taken_back_at_once(folder):
+    made, table = live_grid(folder, "points")
+    before = dict(made.draft.tables)
+    made.overrule(made.draft.tables["points"].rows[3].cells[0], "leave_out", "a clamp")
+    block = [["N1", "6.5", "0", "0.9"], ["N2", "0", "6.5", "0.9"]]
+    table._paste(len(before["points"].rows), 0, block)
+    assert made.draft.undo()
+    assert made.draft.tables["points"] is before["points"]
+    assert "overrulings" in made.draft.tables
+    assert made.draft.undo()
+    assert made.draft.tables == before
+    assert not made.draft.undo()
+    with pytest.raises(KeyError), made.draft.as_one_edit():
+        made.draft.insert_rows("points", 0)
+        made.draft.insert_rows("nothing", 0)
+    assert made.draft.tables == before
+    assert not made.draft.undo()
+
+
 def test_a_run_can_be_stopped(folder, tmp_path):
     run, heard = Run(folder, tmp_path / "out", papers=False), []
 
