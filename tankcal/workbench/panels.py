@@ -8,7 +8,7 @@ import ipywidgets as widgets
 from tankcal.errors import InputError, TankcalError
 from tankcal.workbench.desk import Refusal
 from tankcal.workbench.grid import Grid
-from tankcal.workbench.result_views import live_results
+from tankcal.workbench.result_views import live_results, warnings_page
 
 PAUSE_S = 0.3  # after an edit, before the job is checked
 
@@ -310,6 +310,7 @@ class ResultsPanel:
         if run.error is None:
             names = ", ".join(path.name for path in run.files)
             self._state(word("written", folder=str(self.desk.out.resolve()), files=names), "#1b5e20")
+            self.state.value += warnings_page(self.desk)
         elif isinstance(run.error, TankcalError):
             self._state("\n".join(self.desk.reader.say(one) for one in run.error.texts))
         elif isinstance(run.error, OSError):

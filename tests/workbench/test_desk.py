@@ -1,6 +1,7 @@
 """The desk without a browser: numbers of a language, what is shown, live grids, running."""
 
 import json
+from html import unescape
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from tankcal.workbench import Refusal, desk, open_job
 from tankcal.workbench.computing import Run, Stopped
 from tankcal.workbench.decimals import Unwritten, entered_text, shown_text
 from tankcal.workbench.desk import Desk
+from tankcal.workbench.result_views import warnings_page
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NUMBER = Field("x_m", "number", "")
@@ -276,6 +278,19 @@ def test_overruling_in_a_new_job_of_decimal_commas(folder):
     lines = noted.read_text().splitlines()
     assert lines[:2] == ["# decisions", "point;table;row;decision;reason;by;date"]
     assert lines[2].startswith(f'{name};;;leave_out;"a clamp; seen";;2')
+
+
+def test_warnings_of_a_run_stand_with_its_results(folder, tmp_path):
+    """What only the run knows: the certificate lacks what ISO/IEC 17025 requires."""
+    made = open_job(folder, out=tmp_path / "out", live=False, language="pt-BR")
+    made.run(papers=False)
+    page = made.results._repr_mimebundle_()["text/html"]
+    own = [one for one in made.last_run.result.warnings if one.column == "certificate"]
+    assert own
+    assert made.reader.line(own[0]) in unescape(page)
+    assert str((tmp_path / "out").resolve()) in page
+    told = [made.reader.line(one) for one in made.outcome.warnings]
+    assert not any(one in unescape(warnings_page(made)) for one in told)
 
 
 def test_what_was_done_at_once_is_taken_back_at_once(folder):
