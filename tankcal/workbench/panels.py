@@ -309,7 +309,9 @@ class ResultsPanel:
         word = self.desk.reader.word
         if run.error is None:
             names = ", ".join(path.name for path in run.files)
-            self._state(word("written", folder=str(self.desk.out.resolve()), files=names), "#1b5e20")
+            self._state(
+                word("written", folder=str(self.desk.out.resolve()), files=names), "#1b5e20"
+            )
             self.state.value += warnings_page(self.desk)
         elif isinstance(run.error, TankcalError):
             self._state("\n".join(self.desk.reader.say(one) for one in run.error.texts))
