@@ -226,6 +226,10 @@ class Desk:
         """Save, and the Run of the job to be started; Refusal: the job cannot be computed."""
         if not self.outcome.is_sound:
             raise Refusal("\n".join(self.reader.line(one) for one in self.outcome.problems))
+        try:
+            self.draft.refuse_changed_elsewhere()  # what is shown is what is computed
+        except InputError as error:
+            raise self.refusal(error) from None
         self.save()
         return Run(self.draft.source, self.out, tell, papers, on_result)
 

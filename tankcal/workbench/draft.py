@@ -248,7 +248,7 @@ class Draft:
 
     @contextmanager
     def as_one_edit(self):
-        """What is edited within is one edit, which Undo takes back at once; all of it or nothing."""
+        """What is edited within is one edit for Undo; on an error nothing of it stays."""
         state, before = (dict(self.tables), dict(self.keys)), [*self._before]
         try:
             yield
@@ -336,15 +336,15 @@ class Draft:
         Raises
         ------
         InputError
-            Where an entry cannot be written, or a file is no longer as it was read.
+            Where an entry cannot be written, or a file is no longer as it was read: of those
+            that are to be written, or of all where nothing is.
         """
         waiting = [*self._not_written()]
         if waiting:
             raise InputError(waiting)
         files, _ = self.edited()
-        folder = self.source.parent if self.is_book else self.source
-        paths = {name: (folder / name).resolve() for name in files}
-        self._refuse_changed_elsewhere(paths)
+        folder, paths = self._folder, self._paths(files)
+        self.refuse_changed_elsewhere(files or self._disk)
         _replace_all({paths[name]: data for name, data in files.items()}, self._disk, paths)
         self._disk.update(files)
         if self.is_book and files:
@@ -353,15 +353,23 @@ class Draft:
         self._first = {**self.tables, **self.keys}
         return [folder / name for name in files]
 
-    def _refuse_changed_elsewhere(self, paths):
+    @property
+    def _folder(self):
+        return self.source.parent if self.is_book else self.source
+
+    def _paths(self, names):
+        return {name: (self._folder / name).resolve() for name in names}
+
+    def refuse_changed_elsewhere(self, names=None):
+        """InputError where one of these files, or of all, is no longer as it was read."""
         expected = message(
             "changed_elsewhere",
             "another program has changed the file since it was opened here; nothing was written. "
             "Open the notebook again",
         )
         changed = []
-        for name, path in paths.items():
-            data = path.read_bytes() if path.is_file() else None
+        for name, path in self._paths(self._disk if names is None else names).items():
+            data = read_bytes(path, Log()) if path.is_file() else None
             if _digest(data) != _digest(self._disk[name]):
                 changed.append(Problem(name, expected))
         if changed:

@@ -293,6 +293,28 @@ def test_warnings_of_a_run_stand_with_its_results(folder, tmp_path):
     assert not any(one in unescape(warnings_page(made)) for one in told)
 
 
+def insert_rows_of_two(draft, *names):
+    with draft.as_one_edit():
+        for name in names:
+            draft.insert_rows(name, 0)
+
+
+def test_nothing_is_computed_but_what_is_shown(folder, tmp_path):
+    made = open_job(folder, out=tmp_path / "out", live=False)
+    path = folder / "courses.csv"
+    before = path.read_bytes()
+    path.write_bytes(before + b"# a word\n")
+    for act in (made.save, made.run):  # nothing was edited here
+        with pytest.raises(Refusal, match=r"courses\.csv: another program has changed"):
+            act()
+    assert not (tmp_path / "out").exists()
+    name = made.draft.tables["points"].rows[3].cells[0]
+    made.overrule(name, "leave_out", "a clamp")  # what was edited can be saved
+    assert [one.name for one in made.save()] == ["overrulings.csv"]
+    path.write_bytes(before)
+    assert made.run(papers=False)
+
+
 def test_what_was_done_at_once_is_taken_back_at_once(folder):
     made, table = live_grid(folder, "points")
     before = dict(made.draft.tables)
@@ -305,9 +327,8 @@ def test_what_was_done_at_once_is_taken_back_at_once(folder):
     assert made.draft.undo()
     assert made.draft.tables == before
     assert not made.draft.undo()
-    with pytest.raises(KeyError), made.draft.as_one_edit():
-        made.draft.insert_rows("points", 0)
-        made.draft.insert_rows("nothing", 0)
+    with pytest.raises(KeyError):
+        insert_rows_of_two(made.draft, "points", "nothing")
     assert made.draft.tables == before
     assert not made.draft.undo()
 
