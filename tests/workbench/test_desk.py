@@ -371,3 +371,15 @@ def test_desk_lists_its_tables(folder):
     made = open_job(folder, live=False)
     assert {"points", "courses", "settings", "problems"} <= set(dir(made))
     assert not set(TABLES) & set(vars(Desk))
+
+
+def test_an_app_ends_what_a_closed_page_leaves_and_keeps_an_open_one(monkeypatch):
+    app = pytest.importorskip("voila.app")
+    from tankcal.workbench import serving
+
+    asked = []
+    monkeypatch.setattr(app.Voila, "launch_instance", lambda _, config: asked.append(config))
+    serving.serve_app("n.ipynb", 1, is_browser=False)
+    manager = asked[0]["MappingKernelManager"]
+    assert manager["cull_idle_timeout"] == 600
+    assert not manager["cull_connected"]
