@@ -212,6 +212,9 @@ class Desk:
             written = self.draft.save()
         except InputError as error:
             raise self.refusal(error) from None
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise Refusal(self.reader.word("not_saved", reason=reason)) from None
         self._checked = None
         self.tell()
         return written
@@ -246,6 +249,9 @@ class Desk:
             run.wait()
         except TankcalError as error:
             raise self.refusal(error) from None
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise Refusal(self.reader.word("not_written", reason=reason)) from None
         self.keep_run(run)
         return run.result
 

@@ -383,3 +383,17 @@ def test_an_app_ends_what_a_closed_page_leaves_and_keeps_an_open_one(monkeypatch
     manager = asked[0]["MappingKernelManager"]
     assert manager["cull_idle_timeout"] == 600
     assert not manager["cull_connected"]
+
+
+def test_what_cannot_be_written_is_told_without_a_traceback(folder, monkeypatch):
+    def refuse(*_args, **_options):
+        raise OSError(30, "Read-only file system")
+
+    made = open_job(folder, live=False, language="es")
+    monkeypatch.setattr("tempfile.mkstemp", refuse)
+    monkeypatch.setattr("tankcal.report.outputs.write", refuse)
+    with pytest.raises(Refusal, match="Read-only"):
+        made.run(papers=False)
+    made.enter("courses", 0, "thickness_mm", "8,5")
+    with pytest.raises(Refusal, match="Read-only"):
+        made.save()
