@@ -379,11 +379,11 @@ def read_csv(file, data, separator, decimal, log, settings_file=SETTINGS_FILE):
             "; for decimal commas set [csv] separator = ';' and decimal = ',' in {settings_file}",
             settings_file=settings_file,
         )
-    separator = _separator_of_blank(text) or separator
+    separator = separator_of_blank(text) or separator
     return make_table(file, _csv_rows(file, text, separator, log), decimal, log, hint)
 
 
-def _separator_of_blank(text):
+def separator_of_blank(text):
     """The comma, where nothing was filled in below a heading that `tankcal new` wrote with it."""
     written = (line.lstrip(' \t"') for line in _lines(text))
     rows = (line for line in written if line and not line.startswith("#"))

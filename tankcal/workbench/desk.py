@@ -212,6 +212,9 @@ class Desk:
             written = self.draft.save()
         except InputError as error:
             raise self.refusal(error) from None
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise Refusal(self.reader.word("not_saved", reason=reason)) from None
         self._checked = None
         self.tell()
         return written
@@ -226,6 +229,10 @@ class Desk:
         """Save, and the Run of the job to be started; Refusal: the job cannot be computed."""
         if not self.outcome.is_sound:
             raise Refusal("\n".join(self.reader.line(one) for one in self.outcome.problems))
+        try:
+            self.draft.refuse_changed_elsewhere()  # what is shown is what is computed
+        except InputError as error:
+            raise self.refusal(error) from None
         self.save()
         return Run(self.draft.source, self.out, tell, papers, on_result)
 
@@ -242,6 +249,9 @@ class Desk:
             run.wait()
         except TankcalError as error:
             raise self.refusal(error) from None
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise Refusal(self.reader.word("not_written", reason=reason)) from None
         self.keep_run(run)
         return run.result
 
@@ -272,19 +282,20 @@ class Desk:
 
         draft, name = self.draft, "overrulings"
         columns = ("point", "decision", "reason", "date")
-        if name not in draft.tables:
-            draft.add_table(name, columns)
-        for column in columns:
-            draft.add_column(name, column)
-        table = draft.tables[name]
-        column = table.headings.index("point")
-        known = [row.cells[column] for row in table.rows]
-        row = known.index(point) if point in known else len(known)
-        if row == len(known):
-            draft.insert_rows(name, row)
         given = {"point": point, "decision": decision, "reason": reason}
         given["date"] = datetime.date.today().isoformat()
-        draft.set_cells(name, [(row, *one) for one in given.items()])
+        with draft.as_one_edit():
+            if name not in draft.tables:
+                draft.add_table(name, columns)
+            for column in columns:
+                draft.add_column(name, column)
+            table = draft.tables[name]
+            column = table.headings.index("point")
+            known = [row.cells[column] for row in table.rows]
+            row = known.index(point) if point in known else len(known)
+            if row == len(known):
+                draft.insert_rows(name, row)
+            draft.set_cells(name, [(row, *one) for one in given.items()])
         self.changed()
 
     @property

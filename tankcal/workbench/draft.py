@@ -9,7 +9,7 @@ draft.save()
 import hashlib
 import os
 import tempfile
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
@@ -34,6 +34,7 @@ FORMULAS = message(
     "has formulas in the sheets of the job; edit it in Excel or LibreOffice, for their values "
     "would be lost here",
 )
+KEPT_EDITS = 200  # that Undo takes back
 
 
 def source_of(path):
@@ -243,7 +244,19 @@ class Draft:
         if self.locked is not None:
             raise InputError(Problem(self.source.name, self.locked))
         self._before.append((dict(self.tables), dict(self.keys)))
-        del self._before[:-200]
+        del self._before[:-KEPT_EDITS]
+
+    @contextmanager
+    def as_one_edit(self):
+        """What is edited within is one edit for Undo; on an error nothing of it stays."""
+        state, before = (dict(self.tables), dict(self.keys)), [*self._before]
+        try:
+            yield
+        except BaseException:
+            (self.tables, self.keys), self._before = state, before
+            raise
+        if self._before and (not before or self._before[-1] is not before[-1]):
+            self._before = [*before, state][-KEPT_EDITS:]
 
     def undo(self):
         """Take the last edit back; False: there is none."""
@@ -323,15 +336,15 @@ class Draft:
         Raises
         ------
         InputError
-            Where an entry cannot be written, or a file is no longer as it was read.
+            Where an entry cannot be written, or a file is no longer as it was read: of those
+            that are to be written, or of all where nothing is.
         """
         waiting = [*self._not_written()]
         if waiting:
             raise InputError(waiting)
         files, _ = self.edited()
-        folder = self.source.parent if self.is_book else self.source
-        paths = {name: (folder / name).resolve() for name in files}
-        self._refuse_changed_elsewhere(paths)
+        folder, paths = self._folder, self._paths(files)
+        self.refuse_changed_elsewhere(files or self._disk)
         _replace_all({paths[name]: data for name, data in files.items()}, self._disk, paths)
         self._disk.update(files)
         if self.is_book and files:
@@ -340,15 +353,23 @@ class Draft:
         self._first = {**self.tables, **self.keys}
         return [folder / name for name in files]
 
-    def _refuse_changed_elsewhere(self, paths):
+    @property
+    def _folder(self):
+        return self.source.parent if self.is_book else self.source
+
+    def _paths(self, names):
+        return {name: (self._folder / name).resolve() for name in names}
+
+    def refuse_changed_elsewhere(self, names=None):
+        """InputError where one of these files, or of all, is no longer as it was read."""
         expected = message(
             "changed_elsewhere",
             "another program has changed the file since it was opened here; nothing was written. "
             "Open the notebook again",
         )
         changed = []
-        for name, path in paths.items():
-            data = path.read_bytes() if path.is_file() else None
+        for name, path in self._paths(self._disk if names is None else names).items():
+            data = read_bytes(path, Log()) if path.is_file() else None
             if _digest(data) != _digest(self._disk[name]):
                 changed.append(Problem(name, expected))
         if changed:

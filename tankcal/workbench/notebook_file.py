@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 
 import tankcal
 from tankcal.errors import InputError, Problem
@@ -34,7 +35,8 @@ def make_notebook(source, path, language=None):
     words = reader.words["workbench"]["notebook"]
     job = _counted_from(source.resolve(), path.resolve().parent)
     name = source.resolve().name
-    tank = desk.draft.value("tank", "id") or source.resolve().name
+    tank = _plain(desk.draft.value("tank", "id") or name)
+    name = name.replace("`", "'")  # which would end the code that it stands in
     cells = [
         _text(f"# {words['title'].format(tank=tank)}\n\n{words['about'].format(job=name)}"),
         _code(
@@ -111,6 +113,11 @@ def _counted_from(source, folder):
 def _digest(cells):
     sources = [[one["cell_type"], "".join(one["source"])] for one in cells]
     return hashlib.sha256(json.dumps(sources).encode()).hexdigest()
+
+
+def _plain(text):
+    """A text as Markdown that shows it as it is; no backslashes, for some begin a formula."""
+    return re.sub(r"[#$&*<>\[\\\]_`|~]", lambda mark: f"&#{ord(mark[0])};", " ".join(text.split()))
 
 
 def _part(title, note, code):

@@ -8,7 +8,7 @@ import ipywidgets as widgets
 from tankcal.errors import InputError, TankcalError
 from tankcal.workbench.desk import Refusal
 from tankcal.workbench.grid import Grid
-from tankcal.workbench.result_views import live_results
+from tankcal.workbench.result_views import live_results, warnings_page
 
 PAUSE_S = 0.3  # after an edit, before the job is checked
 
@@ -112,23 +112,24 @@ class TableGrid:
         later(desk)
 
     def _enter(self, changes):
-        self.desk.reader.enter(
-            self.desk.draft, self.name, changes, self.desk.every_key.get(self.name, False)
-        )
+        desk = self.desk
+        with desk.draft.as_one_edit():
+            desk.reader.enter(desk.draft, self.name, changes, desk.every_key.get(self.name, False))
 
     def _paste(self, row, column, cells):
         draft, shown = self.desk.draft, self.grid.columns
-        if self.name in draft.tables:
-            short = row + len(cells) - len(draft.tables[self.name].rows)
-            if short > 0:
-                draft.insert_rows(self.name, len(draft.tables[self.name].rows), short)
         changes = [
             (row + down, shown[column + right]["name"], text)
             for down, line in enumerate(cells)
             for right, text in enumerate(line)
             if column + right < len(shown)
         ]
-        self._enter(changes)
+        with draft.as_one_edit():
+            if self.name in draft.tables:
+                count = len(draft.tables[self.name].rows)
+                if row + len(cells) > count:
+                    draft.insert_rows(self.name, count, row + len(cells) - count)
+            self._enter(changes)
 
     def _insert(self, row, count):
         self.desk.draft.insert_rows(self.name, row, count)
@@ -308,7 +309,10 @@ class ResultsPanel:
         word = self.desk.reader.word
         if run.error is None:
             names = ", ".join(path.name for path in run.files)
-            self._state(word("written", folder=str(self.desk.out), files=names), "#1b5e20")
+            self._state(
+                word("written", folder=str(self.desk.out.resolve()), files=names), "#1b5e20"
+            )
+            self.state.value += warnings_page(self.desk)
         elif isinstance(run.error, TankcalError):
             self._state("\n".join(self.desk.reader.say(one) for one in run.error.texts))
         elif isinstance(run.error, OSError):

@@ -16,6 +16,9 @@ HERE = "127.0.0.1"
 POLICY = (
     "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob: ws: wss:; frame-ancestors 'self'"
 )
+# Voilà refuses the request of a closed page to end its kernel: each visit would keep one.
+# A run that goes on tells its progress, and is let finish.
+LEFT_S, LOOK_S = 600, 60  # nobody looks on and nothing is computed; how often that is looked for
 
 
 def has_lab():
@@ -64,7 +67,10 @@ def serve_app(notebook, port, address=HERE, is_browser=True, token=""):
         "--strip_sources=True",
     ]
     headers = {"Content-Security-Policy": POLICY}
-    settings = Config({"Voila": {"tornado_settings": {"headers": headers}}})
+    left = {"cull_idle_timeout": LEFT_S, "cull_interval": LOOK_S, "cull_connected": False}
+    settings = Config(
+        {"Voila": {"tornado_settings": {"headers": headers}}, "MappingKernelManager": left}
+    )
     Voila.launch_instance(given, config=settings)
 
 

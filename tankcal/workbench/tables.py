@@ -7,6 +7,7 @@ What is not edited stays in the file byte for byte.
 import re
 from dataclasses import dataclass, replace
 
+from tankcal.job.folder import separator_of_blank
 from tankcal.workbench.decimals import Unwritten
 
 _ENDING = re.compile("\r\n|\r|\n")
@@ -111,6 +112,7 @@ class CsvLines:
     lines    with the line's end of each beside it, in `endings`
     heading  index of the line of headings, None: there is none
     before   headings of that line
+    blank_separator  the one of that line, where it is another and nothing was filled in below
     """
 
     separator: str
@@ -120,6 +122,7 @@ class CsvLines:
     before: tuple[str, ...] = ()
     mark: str = ""
     ending: str = "\n"
+    blank_separator: str | None = None
 
     def render(self, table):
         """(bytes of the file, number of each row)."""
@@ -144,9 +147,7 @@ class CsvLines:
                 emit(self.separator.join(map(self._quoted, table.headings)))
         else:
             copy_until(self.heading)
-            added = [one for one in table.headings[len(self.before) :] if one]
-            heading = self.separator.join((self.lines[self.heading], *map(self._quoted, added)))
-            emit(heading, self.endings[self.heading])
+            emit(self._heading_of(table), self.endings[self.heading])
         for row in table.rows:
             if row.line is None and row.is_blank:
                 numbers.append(None)
@@ -168,6 +169,14 @@ class CsvLines:
         """Indices of the lines that were rows when the file was read."""
         begin = 0 if self.heading is None else self.heading + 1
         return [i for i in range(begin, len(self.lines)) if is_row(self.lines[i])]
+
+    def _heading_of(self, table):
+        added = [one for one in table.headings[len(self.before) :] if one]
+        written = (self.lines[self.heading],)
+        is_filled = added or not all(row.is_blank for row in table.rows)
+        if self.blank_separator is not None and is_filled:  # one separator for heading and rows
+            written = map(self._quoted, self.before)
+        return self.separator.join((*written, *map(self._quoted, added)))
 
     def _text_of(self, row):
         if row.line is None:
@@ -196,11 +205,13 @@ def read_csv_table(name, file, text, separator, decimal):
     mark = MARK_OF_ORDER if text.startswith(MARK_OF_ORDER) else ""
     lines, endings = _lines(text.removeprefix(mark))
     heading = next((i for i, line in enumerate(lines) if is_row(line)), None)
+    blank = separator_of_blank(text.removeprefix(mark))
     before = ()
     if heading is not None:
-        before = tuple(cell_of(part) for part in split_line(lines[heading], separator))
+        before = tuple(cell_of(part) for part in split_line(lines[heading], blank or separator))
     ending = next((one for one in endings if one), "\n")
-    origin = CsvLines(separator, lines, endings, heading, before, mark, ending)
+    other = blank if blank != separator else None
+    origin = CsvLines(separator, lines, endings, heading, before, mark, ending, other)
     split = [
         (line, tuple(cell_of(part) for part in split_line(lines[line], separator)))
         for line in (origin.row_lines if heading is not None else ())

@@ -111,6 +111,16 @@ def test_too_many(tmp_path):
     assert problem.expected.code == "overrulings_too_many"
 
 
+@pytest.mark.parametrize("content", [None, "", "point;x_m\n", "point,x_m,x_m\nA,1,2\n"])
+def test_points_that_cannot_be_read_are_told_and_no_decision_is(tmp_path, content):
+    folder = write_folder(tmp_path / "job", with_rows(row(job_parts(rings=2), 3)))
+    path = folder / "points.csv"
+    path.unlink() if content is None else path.write_text(content)
+    told = problems_of(folder)
+    assert told
+    assert {one.file for one in told} == {"points.csv"}
+
+
 def test_straps_have_no_names(tmp_path):
     given = with_rows(["1-20", None, None, "keep", "right", None, None], parts=strapped_parts())
     (problem,) = problems_of(write_folder(tmp_path / "job", given))

@@ -1,6 +1,7 @@
 """The desk without a browser: numbers of a language, what is shown, live grids, running."""
 
 import json
+from html import unescape
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from tankcal.workbench import Refusal, desk, open_job
 from tankcal.workbench.computing import Run, Stopped
 from tankcal.workbench.decimals import Unwritten, entered_text, shown_text
 from tankcal.workbench.desk import Desk
+from tankcal.workbench.result_views import warnings_page
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NUMBER = Field("x_m", "number", "")
@@ -259,6 +261,78 @@ def test_overruling_is_noted_in_the_job(folder, tmp_path):
     assert len(result.accepted) == len(result.job.points.names) - 1
 
 
+def test_overruling_in_a_new_job_of_decimal_commas(folder):
+    """The table as tankcal new wrote it, its heading with commas, where the job has semicolons."""
+    for path in folder.glob("*.csv"):
+        path.write_text(path.read_text().replace(",", ";").replace(".", ","))
+    with (folder / "job.toml").open("a") as file:
+        file.write('\n[csv]\nseparator = ";"\ndecimal = ","\n')
+    noted = folder / "overrulings.csv"
+    noted.write_text("# decisions\npoint,table,row,decision,reason,by,date\n")
+    made = open_job(folder, live=False)
+    assert [one.name for one in made.show("overrulings").columns][:3] == ["point", "table", "row"]
+    name = made.draft.tables["points"].rows[3].cells[0]
+    made.overrule(name, "leave_out", "a clamp; seen")
+    assert made.problems[:] == ()
+    made.save()
+    lines = noted.read_text().splitlines()
+    assert lines[:2] == ["# decisions", "point;table;row;decision;reason;by;date"]
+    assert lines[2].startswith(f'{name};;;leave_out;"a clamp; seen";;2')
+
+
+def test_warnings_of_a_run_stand_with_its_results(folder, tmp_path):
+    """What only the run knows: the certificate lacks what ISO/IEC 17025 requires."""
+    made = open_job(folder, out=tmp_path / "out", live=False, language="pt-BR")
+    made.run(papers=False)
+    page = made.results._repr_mimebundle_()["text/html"]
+    own = [one for one in made.last_run.result.warnings if one.column == "certificate"]
+    assert own
+    assert made.reader.line(own[0]) in unescape(page)
+    assert str((tmp_path / "out").resolve()) in page
+    told = [made.reader.line(one) for one in made.outcome.warnings]
+    assert not any(one in unescape(warnings_page(made)) for one in told)
+
+
+def insert_rows_of_two(draft, *names):
+    with draft.as_one_edit():
+        for name in names:
+            draft.insert_rows(name, 0)
+
+
+def test_nothing_is_computed_but_what_is_shown(folder, tmp_path):
+    made = open_job(folder, out=tmp_path / "out", live=False)
+    path = folder / "courses.csv"
+    before = path.read_bytes()
+    path.write_bytes(before + b"# a word\n")
+    for act in (made.save, made.run):  # nothing was edited here
+        with pytest.raises(Refusal, match=r"courses\.csv: another program has changed"):
+            act()
+    assert not (tmp_path / "out").exists()
+    name = made.draft.tables["points"].rows[3].cells[0]
+    made.overrule(name, "leave_out", "a clamp")  # what was edited can be saved
+    assert [one.name for one in made.save()] == ["overrulings.csv"]
+    path.write_bytes(before)
+    assert made.run(papers=False)
+
+
+def test_what_was_done_at_once_is_taken_back_at_once(folder):
+    made, table = live_grid(folder, "points")
+    before = dict(made.draft.tables)
+    made.overrule(made.draft.tables["points"].rows[3].cells[0], "leave_out", "a clamp")
+    block = [["N1", "6.5", "0", "0.9"], ["N2", "0", "6.5", "0.9"]]
+    table._paste(len(before["points"].rows), 0, block)
+    assert made.draft.undo()
+    assert made.draft.tables["points"] is before["points"]
+    assert "overrulings" in made.draft.tables
+    assert made.draft.undo()
+    assert made.draft.tables == before
+    assert not made.draft.undo()
+    with pytest.raises(KeyError):
+        insert_rows_of_two(made.draft, "points", "nothing")
+    assert made.draft.tables == before
+    assert not made.draft.undo()
+
+
 def test_a_run_can_be_stopped(folder, tmp_path):
     run, heard = Run(folder, tmp_path / "out", papers=False), []
 
@@ -297,3 +371,29 @@ def test_desk_lists_its_tables(folder):
     made = open_job(folder, live=False)
     assert {"points", "courses", "settings", "problems"} <= set(dir(made))
     assert not set(TABLES) & set(vars(Desk))
+
+
+def test_an_app_ends_what_a_closed_page_leaves_and_keeps_an_open_one(monkeypatch):
+    app = pytest.importorskip("voila.app")
+    from tankcal.workbench import serving
+
+    asked = []
+    monkeypatch.setattr(app.Voila, "launch_instance", lambda _, config: asked.append(config))
+    serving.serve_app("n.ipynb", 1, is_browser=False)
+    manager = asked[0]["MappingKernelManager"]
+    assert manager["cull_idle_timeout"] == 600
+    assert not manager["cull_connected"]
+
+
+def test_what_cannot_be_written_is_told_without_a_traceback(folder, monkeypatch):
+    def refuse(*_args, **_options):
+        raise OSError(30, "Read-only file system")
+
+    made = open_job(folder, live=False, language="es")
+    monkeypatch.setattr("tempfile.mkstemp", refuse)
+    monkeypatch.setattr("tankcal.report.outputs.write", refuse)
+    with pytest.raises(Refusal, match="Read-only"):
+        made.run(papers=False)
+    made.enter("courses", 0, "thickness_mm", "8,5")
+    with pytest.raises(Refusal, match="Read-only"):
+        made.save()

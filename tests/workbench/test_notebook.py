@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from html import escape
 from pathlib import Path
 
 import nbformat
@@ -46,6 +47,18 @@ def test_notebook_of_a_workbook_lies_beside_it(tmp_path):
     book = write_workbook(tmp_path / "T 1.xlsx", rings=2)
     assert main(["notebook", str(book), "--no-open"]) == 0
     assert "JOB = 'T 1.xlsx'" in sources(tmp_path / "T 1.ipynb")[1]
+
+
+@pytest.mark.parametrize("tank", ["T (7) _a_ 2", "<img src=x>", "`a` *b* [c](d)"])
+def test_a_name_is_shown_as_it_is(folder, tank):
+    from nbconvert.filters import markdown2html
+
+    path = folder / "job.toml"
+    path.write_text(path.read_text().replace('id = "T-1"', f'id = "{tank}"'))
+    folder = folder.rename(folder.parent / "j `<b>x`")
+    page = markdown2html(make_notebook(folder, folder / "n.ipynb", "en")["cells"][0]["source"])
+    assert escape(tank, quote=False) in page.splitlines()[0]
+    assert "<code>j '&lt;b&gt;x'</code>" in page
 
 
 def test_changed_notebook_is_kept(folder, capsys):

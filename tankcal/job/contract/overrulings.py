@@ -13,6 +13,15 @@ from tankcal.messages import message
 KEEP, LEAVE_OUT = DECISIONS = ("keep", "leave_out")
 _BESIDE = ("targets", "photos", "setups", "check", "fiducials", "film", "correlated_readings")
 READINGS = tuple(name for name in OF_SURVEYS if name not in (*_BESIDE, "control"))
+_NAMELESS = (
+    "circumferences",
+    "offsets",
+    "liquid",
+    "radii",
+    "rings",
+    "great_circles",
+    "scan_targets",
+)
 MOST = 200  # whoever overrules more than that does not overrule a search, but replaces it
 
 OVERRULINGS = (
@@ -103,7 +112,7 @@ def _what(table, row, point, of, number_of, log):
 
 
 def names_of_points(tables):
-    """{name: None} of what the wall is taken from; None: a table of it cannot be read whole.
+    """{name: None} of what the wall is taken from; None: it, or a part of it, cannot be read.
 
     tables  {name: ColumnValues, or None: not there}
     """
@@ -123,6 +132,8 @@ def names_of_points(tables):
             names += [f"{setup} {row}" for setup, row in own]
     if not names and any(has_rows(tables[one]) for one in READINGS):
         return None  # the adjusted points, among which the wall is searched
+    if not names and not any(has_rows(tables[one]) for one in _NAMELESS):
+        return None  # what shows the wall is missing or cannot be read, which is told by itself
     return dict.fromkeys(names)
 
 

@@ -65,9 +65,12 @@ def sentence_of(paper, row):
     """One decision: what, why, by whom, what the search said, and what it is worth."""
     parts = [paper.word(f"overrulings.{row['decision']}", what=_what(paper, row))]
     parts.append(paper.word("overrulings.reason", reason=row["reason"].rstrip(". ")))
-    who = ", ".join(one for one in (row["by"], paper.day(row["date"])) if one)
-    if who:
+    by, day = row["by"], paper.day(row["date"])
+    if by:
+        who = ", ".join(one for one in (by, day) if one)
         parts.append(paper.word("overrulings.by", who=who))
+    elif day:
+        parts.append(paper.word("overrulings.on", day=day))
     searched = _searched(paper, row)
     if searched is not None:
         parts.append(

@@ -34,11 +34,13 @@ class PointsPanel(traitlets.HasTraits):
             options=[(self._line(one), one.name) for one in self.points.values()],
             value=None,
             rows=min(max(len(self.points), 3), 10),
-            layout={"width": "30rem"},
+            layout={"width": "60rem", "max_width": "100%"},
         )
         self.told, self.state = widgets.HTML(), widgets.HTML()
         self.reason = widgets.Text(
-            placeholder=word("views.reason"), layout={"width": "30rem"}, continuous_update=True
+            placeholder=word("views.reason"),
+            layout={"width": "60rem", "max_width": "100%"},
+            continuous_update=True,
         )
         self.previous = _button("◀ " + word("views.previous"), lambda: self.step(-1))
         self.next = _button(word("views.next") + " ▶", lambda: self.step(1))

@@ -11,6 +11,10 @@ from tankcal.workbench.views.calculating import typed_number
 from tankcal.workbench.views.what_if import sentences, suppose, table_html
 
 LARGEST, STEP = 3.0, 0.05
+STYLE = """<style>.tankcal-budget th, .tankcal-budget td { padding: 0 8px; line-height: 1.6;
+  vertical-align: top } .tankcal-budget .left { text-align: left }
+.tankcal-budget .right, .tankcal-budget .decimal { text-align: right; white-space: nowrap;
+  font-variant-numeric: tabular-nums }</style>"""
 
 
 class BudgetPanel:
@@ -37,6 +41,7 @@ class BudgetPanel:
         self.reset = widgets.Button(description=word("views.reset"), layout={"width": "auto"})
         self.reset.on_click(lambda _: self.put_back())
         self.totals, self.table = widgets.HTML(), widgets.HTML()
+        self.table.add_class("tankcal-budget")
         for one in (self.dip, self.low, *self.factors):
             one.observe(self.show, "value")
         lines = [widgets.HBox([one, self._readout(one), self._half(one)]) for one in self.factors]
@@ -62,6 +67,7 @@ class BudgetPanel:
             max=LARGEST,
             step=STEP,
             description=name,
+            tooltip=name,  # a long one is cut
             continuous_update=False,
             readout=False,  # it knows the decimal point alone
             style={"description_width": "24rem"},
@@ -69,7 +75,7 @@ class BudgetPanel:
         )
 
     def _readout(self, slider):
-        label = widgets.Label(layout={"width": "3rem"})
+        label = widgets.Label(layout={"width": "3rem", "flex": "none"})
 
         def show(_change=None):
             label.value = fixed(slider.value, 2, self.paper.marks)
@@ -80,7 +86,9 @@ class BudgetPanel:
 
     def _half(self, slider):
         button = widgets.Button(
-            description="× ½", tooltip=self.paper.word("views.half"), layout={"width": "auto"}
+            description="× ½",
+            tooltip=self.paper.word("views.half"),
+            layout={"width": "auto", "flex": "none"},
         )
 
         def halve(_):
@@ -114,7 +122,7 @@ class BudgetPanel:
             return
         said = "<br>".join(map(escape, sentences(self.paper, found)))
         self.totals.value = f'<div role="status">{said}</div>'
-        self.table.value = table_html(self.paper, found)
+        self.table.value = STYLE + table_html(self.paper, found)
 
     def _refuse(self, text):
         self.totals.value = f'<div role="status" style="color:#a01818">{escape(text)}</div>'
