@@ -477,3 +477,19 @@ def test_a_problem_with_numbers_of_numpy_is_kept(tmp_path, capsys):
     assert {name: row["status"] for name, row in summary(tmp_path / "out").items()} == {
         "T-0": "refused", "T-1": "done"
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("place", ["jobs/T-0", "jobs/T-0/outcome.json"])
+def test_something_in_the_way_fails_that_job_alone(tmp_path, place, capsys):
+    write_jobs(tmp_path / "site", 2)
+    way = tmp_path / "out" / place
+    if way.suffix:
+        way.mkdir(parents=True)
+    else:
+        way.parent.mkdir(parents=True)
+        way.write_text("something else")
+    assert main(batch_of(tmp_path)) == 2
+    (line,) = errors(capsys)
+    assert line.startswith(f"tankcal: T-0: {place}: is no file or folder of a batch (")
+    rows = summary(tmp_path / "out")
+    assert {name: row["status"] for name, row in rows.items()} == {"T-0": "failed", "T-1": "done"}
