@@ -4,6 +4,7 @@
 """
 
 from dataclasses import dataclass
+from math import isfinite
 
 from tankcal.messages import Message, as_plain, message
 
@@ -88,12 +89,21 @@ def problem_of(problem):
     return {
         "book": problem.book,
         "file": problem.file,
-        "row": problem.row,
+        "row": None if problem.row is None else int(problem.row),
         "column": problem.column,
         "cell": problem.cell,
         "text": str(problem.expected),
-        **as_plain(problem.expected),
+        **_without_nan(as_plain(problem.expected)),
     }
+
+
+def _without_nan(plain):
+    """Plain data with null for what is no finite number, which JSON does not hold."""
+    if isinstance(plain, dict):
+        return {name: _without_nan(one) for name, one in plain.items()}
+    if isinstance(plain, list):
+        return [_without_nan(one) for one in plain]
+    return None if isinstance(plain, float) and not isfinite(plain) else plain
 
 
 def problem_from(plain):

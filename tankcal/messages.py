@@ -68,6 +68,8 @@ def as_plain(text):
 def _plain(value):
     if isinstance(value, Message):
         return {**as_plain(value), "text": str(value)}
+    if hasattr(value, "tolist"):  # a number or an array of numpy, which JSON cannot hold
+        value = value.tolist()
     return [_plain(one) for one in value] if isinstance(value, list | tuple) else value
 
 

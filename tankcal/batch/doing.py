@@ -24,6 +24,7 @@ from tankcal.batch.outcomes import (
 from tankcal.errors import InputError, Problem, TankcalError, problem_of
 from tankcal.messages import message
 
+IN_THE_WAY = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR)  # of one job, not of the batch
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 STATUS_OF_EXIT = {2: "refused", 3: "unsound"}
 
@@ -70,6 +71,8 @@ def do_job(task):
     try:
         return _do_steps(task)
     except OSError as error:
+        if error.errno in IN_THE_WAY:
+            return _in_the_way(task, error)
         text = message(
             "batch_no_room",
             "nothing more can be written there ({reason}); expected room for the results: then the "
@@ -77,6 +80,14 @@ def do_job(task):
             reason=error.strerror or str(error),
         )
         raise InputError(Problem(task.out, text)) from error
+
+
+def _in_the_way(task, error):
+    """What `do_job` gives where something else lies in the place of a job's folder or outcome."""
+    path = error.filename2 or error.filename or folder_of(task.out, task.job.name)
+    text = message("batch_in_the_way", "is no file or folder of a batch ({reason}); expected it "
+                   "taken away", reason=error.strerror or str(error))  # fmt: skip
+    return "failed", [problem_of(Problem(os.path.relpath(path, task.out), text))], 1
 
 
 def _do_steps(task):

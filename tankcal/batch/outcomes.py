@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from tankcal.batch.asked import FOLDERS, STEPS
+from tankcal.batch.kept_data import is_step
 
 JOBS, FILE, FORMAT = "jobs", "outcome.json", "tankcal-outcome/1"
 STATUSES = ("done", "unsound", "refused", "failed")  # from the best to the worst
@@ -89,7 +90,10 @@ def load_outcome(out, name):
         if saved.get("format") != FORMAT:
             return None
         steps = {step: StepOutcome(**one) for step, one in saved["steps"].items() if step in STEPS}
-        there = {step: one for step, one in steps.items() if _has_its_files(folder, step, one)}
+        if not (isinstance(saved["name"], str) and isinstance(saved["source"], str)):
+            return None
+        whole = {step: one for step, one in steps.items() if is_step(one)}
+        there = {step: one for step, one in whole.items() if _has_its_files(folder, step, one)}
         return Outcome(saved["name"], saved["source"], there)
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None

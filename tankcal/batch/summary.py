@@ -10,6 +10,7 @@ from pathlib import Path
 
 import tankcal
 from tankcal.batch.asked import FOLDERS
+from tankcal.batch.kept_data import is_row
 from tankcal.batch.outcomes import JOBS, load_outcome
 from tankcal.report.batch import JSON, summary_files
 
@@ -66,7 +67,7 @@ def _former_rows(path):
     """{name: row} of the last summary; None where there is none that can be read."""
     try:
         rows = json.loads(path.read_bytes())["rows"]
-        return {row["name"]: row for row in rows}
+        return {row["name"]: row for row in rows} if all(map(is_row, rows)) else None
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
         return None
 

@@ -15,6 +15,7 @@ from tankcal.record import load
 
 MOST_FINDINGS = 20  # of the linter, that a refusal repeats
 USUAL_K = 2.0
+COLUMNS = ("volume_m3", "stated_U_m3", "k", "factor_m3")  # of a table in a record
 _RECORD_VALUES = (
     "reference_temperature_c", "liquid_density_kg_m3", "reference_height_m", "date", "method",
     "laboratory", "number", "kind", "dip_from_a_m",
@@ -220,6 +221,7 @@ def _uncertainty(rows, declared, log):
 
 def _of_record(path, record, declared, log):
     """FormerTable of a record; what is declared beside it must not contradict it."""
+    _refuse_unequal(record["capacity"], path, log)
     table, job = record["capacity"], record["job"]
     certificate, choices = job.get("certificate") or {}, _choices(record)
     density = choices.get("head", job["table"].get("liquid_density_kg_m3"))
@@ -267,6 +269,27 @@ def _of_record(path, record, declared, log):
         record=record,
         **values,
     )
+
+
+def _refuse_unequal(table, path, log):
+    """InputError for columns of a record's table that are not as long as its heights."""
+    rows = len(table["height_m"])
+    for name in COLUMNS:
+        if len(table[name]) != rows:
+            expected = message(
+                "former_unequal_columns",
+                "found {found} values; expected {rows}, one for each height",
+                found=len(table[name]),
+                rows=rows,
+            )
+            log.problem(path.name, expected, column=f"capacity.{name}")
+    width = {len(row) if isinstance(row, list) else 0 for row in table["factor_m3"]}
+    if len(width) > 1:
+        expected = message(
+            "former_unequal_rows", "found rows of different length; expected as many values in each"
+        )
+        log.problem(path.name, expected, column="capacity.factor_m3")
+    log.stop_if_problems()
 
 
 def _choices(record):

@@ -407,3 +407,89 @@ def test_the_example_is_a_batch_of_one(tmp_path, capsys):
     command = ["batch", str(EXAMPLE), "--out", str(tmp_path), "--no-papers", "--quiet"]
     assert main(command) == 0
     assert summary(tmp_path)["silva-1995"]["tank"] == "SILVA-1995"
+
+
+# ---- what somebody else wrote into what a batch keeps
+
+
+def of_run(**more):
+    return lambda kept: kept["steps"]["run"].update(more)
+
+
+@pytest.mark.parametrize(
+    "spoil_it",
+    [
+        of_run(values=[1]),
+        of_run(values={"volume_m3": "many"}),
+        of_run(values={"volume_m3": 1.0, "U_m3": [1]}),
+        of_run(values={"volume_m3": float("nan")}),
+        of_run(values={"rule_verdict": "odd"}),
+        of_run(values={"global_test": "yes"}),
+        of_run(status="odd"),
+        of_run(status=[]),
+        of_run(files="record.json"),
+        of_run(problems=5),
+        of_run(warning_count=None),
+        of_run(status="refused", problems=[{"file": 1}], problem_count=1),
+        of_run(warnings=[{"file": "a", "text": "t", "code": "x", "values": 5}], warning_count=1),
+        lambda kept: kept.update(source=[1]),
+        lambda kept: kept.update(name=5),
+        lambda kept: kept.update(steps=[]),
+    ],
+)
+def test_an_outcome_that_is_not_whole_counts_as_none(two, spoil_it, capsys):
+    _, out = two
+    path = out / "jobs" / "T-0" / "outcome.json"
+    before = path.read_bytes()
+    kept = json.loads(before)
+    spoil_it(kept)
+    path.write_text(json.dumps(kept))
+    assert again(two) == 0
+    assert errors(capsys) == []
+    assert path.read_bytes() == before
+    assert jobs_in(out, "begun") == ["T-0", "T-1", "T-0"]
+    assert [row["changes"] for row in summary(out).values()] == [[], []]
+
+
+@pytest.mark.parametrize(
+    "more",
+    [{"name": 5}, {"volume_m3": "x"}, {"U_m3": "x", "volume_m3": 3}, {"status": [1]},
+     {"volume_m3": float("nan")}, {"rule_verdict": "odd"}],
+)  # fmt: skip
+def test_a_summary_that_is_not_whole_tells_no_changes(two, more, capsys):
+    _, out = two
+    kept = json.loads((out / "summary.json").read_text())
+    kept["rows"][0].update(more)
+    (out / "summary.json").write_text(json.dumps(kept))
+    assert again(two) == 0
+    assert errors(capsys) == []
+    assert [row["changes"] for row in summary(out).values()] == [None, None]
+
+
+def test_a_problem_with_numbers_of_numpy_is_kept(tmp_path, capsys):
+    """Courses without points are counted by numpy, which JSON does not hold."""
+    site = write_jobs(tmp_path / "site", 2)
+    path = site / "T-0" / "points.csv"
+    path.write_text("".join(path.read_text("utf-8").splitlines(True)[:3]), "utf-8")
+    assert main(batch_of(tmp_path)) == 2
+    (line,) = errors(capsys)
+    assert line.startswith("tankcal: T-0: courses.csv, row 2, course: ")
+    assert {name: row["status"] for name, row in summary(tmp_path / "out").items()} == {
+        "T-0": "refused", "T-1": "done"
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("place", ["jobs/T-0", "jobs/T-0/outcome.json"])
+def test_something_in_the_way_fails_that_job_alone(tmp_path, place, capsys):
+    write_jobs(tmp_path / "site", 2)
+    way = tmp_path / "out" / place
+    if way.suffix:
+        way.mkdir(parents=True)
+    else:
+        way.parent.mkdir(parents=True)
+        way.write_text("something else")
+    assert main(batch_of(tmp_path)) == 2
+    (line,) = errors(capsys)
+    assert line.startswith(f"tankcal: T-0: {place}: is no file or folder of a batch (")
+    rows = summary(tmp_path / "out")
+    assert {name: row["status"] for name, row in rows.items()} == {"T-0": "failed", "T-1": "done"}

@@ -206,3 +206,16 @@ def test_dips_that_are_none_are_refused(archive, dips, capsys):
         main(["history", str(archive), f"--at={dips}"])
     assert end.value.code == 2
     assert "expected dips in metres" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("column", ["volume_m3", "stated_U_m3", "k", "factor_m3"])
+def test_columns_of_unequal_length_are_told(archive, column):
+    path = archive / "2019" / "T-1" / "record.json"
+    record = json.loads(path.read_text(encoding="utf-8"))
+    record["capacity"][column] = []
+    path.write_text(json.dumps(record), encoding="utf-8")
+    with pytest.raises(InputError) as told:
+        history_of_files([archive], tanks=["T-1"])
+    assert any(f"capacity.{column}" in str(one) or column == "volume_m3"
+               for one in told.value.problems)  # fmt: skip
+    assert all(one.file == "2019/T-1/record.json" for one in told.value.problems)

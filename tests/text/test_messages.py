@@ -2,6 +2,7 @@
 
 import ast
 import copy
+import json
 import pickle
 from collections import defaultdict
 from pathlib import Path
@@ -12,6 +13,7 @@ from job_builder import write_job
 from messages_told import lines
 
 import tankcal
+from tankcal.errors import Problem, problem_of
 from tankcal.job.rule_files import shipped_names, shipped_rule
 from tankcal.messages import as_plain, fields_of, join_with_and, list_some, message
 from tankcal.record import record_of
@@ -226,3 +228,13 @@ def test_a_text_of_an_array_is_quoted_as_any_other():
     assert message("of", "course {name!r}", name=names[0]) == "course 'A-1'"
     assert message("of", "{of!r}", of=message("known", "known")) == "'known'"
     assert message("of", "{count!r}", count=2) == "2"
+
+
+def test_a_problem_is_plain_whatever_its_numbers_are():
+    """JSON holds no numbers of numpy, and none that are not finite."""
+    text = message("few", "{count} of {most}: {part:.1f}, {row}", count=np.int64(3), most=(1, 2),
+                   part=float("nan"), row=np.array([1.5, 2.5]))  # fmt: skip
+    plain = problem_of(Problem("courses.csv", text, np.int64(2), "course"))
+    again = json.loads(json.dumps(plain, allow_nan=False))
+    assert again["row"] == 2
+    assert again["values"] == {"count": 3, "most": [1, 2], "part": None, "row": [1.5, 2.5]}

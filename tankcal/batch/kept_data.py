@@ -1,0 +1,102 @@
+"""Whether what an earlier batch kept is whole: outcomes and the rows of its summary.
+
+Both lie where anybody can edit them. What is not as a batch writes it counts as if it were not
+there: the job is done again, and no change is told.
+"""
+
+from functools import cache
+from math import isfinite
+
+from tankcal.report.batch.paper import OF_RULE
+from tankcal.text.words import load_words
+
+TEXTS = ("tank", "kind", "date", "rule", *OF_RULE)
+NUMBERS = ("height_m", "volume_m3", "U_m3", "former_m3", "of_tank_m3")
+PLACES = ("book", "column", "cell")
+PASSED = "global_test"  # the verdict that is true or false
+
+
+def is_step(step):
+    """Whether the attributes of a `StepOutcome` are of the kinds that they should be."""
+    return (
+        isinstance(step.key, str)
+        and isinstance(step.status, str)
+        and step.status in codes("statuses")
+        and isinstance(step.files, list)
+        and all(isinstance(one, str) for one in step.files)
+        and isinstance(step.values, dict)
+        and are_values(step.values)
+        and all(isinstance(one, list) for one in (step.problems, step.warnings))
+        and all(map(is_problem, (*step.problems, *step.warnings)))
+        and all(map(_is_count, (step.problem_count, step.warning_count)))
+    )
+
+
+def is_row(row):
+    """Whether a row of a summary can be compared with another one."""
+    return (
+        isinstance(row, dict)
+        and isinstance(row.get("name"), str)
+        and isinstance(row.get("status"), str)
+        and row["status"] in codes("statuses")
+        and are_values(row)
+    )
+
+
+def are_values(values):
+    """Whether the numbers, texts and verdicts among values are such."""
+    return (
+        all(_is_number(values.get(name)) for name in NUMBERS)
+        and all(_is_text(values.get(name)) for name in TEXTS if name != PASSED)
+        and isinstance(values.get(PASSED), bool | None)
+        and all(
+            values.get(name) is None or values[name].lower() in codes(words)
+            for name, words in OF_RULE.items()
+            if name != PASSED
+        )
+    )
+
+
+def is_problem(plain):
+    """Whether plain data is what `errors.problem_of` gives."""
+    return (
+        isinstance(plain, dict)
+        and isinstance(plain.get("file"), str)
+        and all(_is_text(plain.get(name)) for name in PLACES)
+        and isinstance(plain.get("row"), int | None)
+        and _is_message(plain)
+    )
+
+
+def _is_message(plain):
+    return (
+        isinstance(plain.get("text"), str)
+        and _is_text(plain.get("code"))
+        and isinstance(plain.get("values"), dict)
+        and all(map(_can_be_said, plain["values"].values()))
+    )
+
+
+def _can_be_said(value):
+    if isinstance(value, list):
+        return all(map(_can_be_said, value))
+    return _is_message(value) if isinstance(value, dict) else True
+
+
+def _is_number(value):
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return value is None or (is_number and abs(value) < 1e300 and isfinite(value))
+
+
+def _is_text(value):
+    return isinstance(value, str | None)
+
+
+def _is_count(value):
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+
+
+@cache
+def codes(words):
+    """The codes that the summary has words for: of "statuses", of a verdict."""
+    return frozenset(load_words("en")["batch"][words])
