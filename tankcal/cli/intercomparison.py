@@ -227,7 +227,7 @@ def _score(options):
 
         refuse_foreign(options.out)
     show = Progress(options.quiet or options.machine)
-    show.step(message("ic_scoring", "scoring {count} folders of answers",
+    show.step(message("ic_scoring", "scoring answers (folders: {count})",
                       count=len(options.names)))  # fmt: skip
     found = plain_of(score_folders(options.names, options.truth, options.package))
     written = ()

@@ -59,6 +59,7 @@ CSV_KEYS = (
 SECTIONS = {"participant": KEYS, "csv": CSV_KEYS}
 SAME_M = 1e-6  # heights that are one
 MOST_NAMED = 5
+MOST_TIMES = 4  # as many rows as heights that were asked: beyond it one line says so
 ABOUT = (
     message(
         "ic_about_participant",
@@ -202,7 +203,7 @@ def _participant(path, log):
     before, data = len(log.problems), read_bytes(path, log, MAX_SETTINGS_BYTES)
     settings, sections = (None, {}) if data is None else read_toml(path.name, data, log)
     if settings is None:
-        return None, (",", ".")
+        return None, None
     for section in settings:
         if section not in SECTIONS:
             text = unknown_section(section, SECTIONS)
@@ -222,10 +223,11 @@ def _participant(path, log):
 def _read_table(path, tank, method, asked, marks, log):
     """The Answer of a table; None where it is empty or wrong."""
     before, data = len(log.problems), read_bytes(path, log)
-    if data is None or marks is None:
+    if data is None:
         return None
+    marks = marks or _likely_marks(data)
     table = read_csv(path.name, data, *marks, log, settings_file=PARTICIPANT)
-    if table is None:
+    if table is None or _has_too_many(path.name, len(table.rows), asked[tank][0], log):
         return None
     values = read_columns(None, table, log, ROWS)
     if "volume_m3" not in table.headings:
@@ -253,6 +255,13 @@ def _read_table(path, tank, method, asked, marks, log):
     return Answer(tank, method, *columns)
 
 
+def _likely_marks(data):
+    """(separator, decimal mark) of a table whose participant.toml cannot be read: told already."""
+    heading = data.partition(b"\n")[0].decode("utf-8", "replace")
+    separator = next((one for one in SEPARATORS[1:] if one in heading), SEPARATORS[0])
+    return separator, "," if separator != "," and b"," in data else "."
+
+
 def _factors(name, rows, U, k, coverage, log):
     """Coverage factors: as stated, or of the stated probability of a normal distribution."""
     for row, factor, share in zip(rows, k, coverage, strict=True):
@@ -261,6 +270,16 @@ def _factors(name, rows, U, k, coverage, log):
             log.problem(name, text, row, "coverage")
     found = np.where(np.isfinite(coverage), norm.ppf((1 + np.nan_to_num(coverage)) / 2), k)
     return np.where(np.isfinite(U), found, np.nan)
+
+
+def _has_too_many(name, count, asked, log):
+    """Whether, told to `log`, there are so many rows that to name each would help nobody."""
+    if count <= MOST_TIMES * len(asked):
+        return False
+    text = message("ic_too_many_rows", "{count} rows; expected {asked} at most, one for each "
+                   "height that is asked", count=count, asked=len(asked))  # fmt: skip
+    log.problem(name, text)
+    return True
 
 
 def _check_heights(name, rows, height, asked, log):
@@ -285,9 +304,11 @@ def _tell_missing(name, height, asked, log):
     missing = [one for one in asked if not np.any(np.abs(height - one) <= SAME_M)]
     if missing:
         text = message(
-            "ic_missing_heights", "{missing} of {asked} heights without a volume ({heights} m)",
+            "ic_missing_heights", "{missing} of {asked} heights without a volume ({heights})",
             missing=len(missing), asked=len(asked),
-            heights=list_some([f"{one:g}" for one in missing], MOST_NAMED),
+            heights=list_some(
+                [message("ic_height", "{height:g} m", height=one) for one in missing], MOST_NAMED
+            ),
         )  # fmt: skip
         log.warning(name, text)
 
@@ -313,7 +334,7 @@ def _read_json(path, asked, log, warnings):
         elif len(lengths) > 1:
             log.problem(name, message("ic_uneven", "lists of different lengths; expected a value "
                         "(or null) for each height"))  # fmt: skip
-        else:
+        elif not _has_too_many(name, len(one["height_m"]), asked[one["tank"]][0], log):
             U, k = (_checked_positive(name, key, one[key], log) for key in ("U_m3", "k"))
             height = np.array(one["height_m"], float)
             _check_heights(name, range(1, len(height) + 1), height, asked[one["tank"]][0], log)

@@ -280,11 +280,12 @@ def fingerprint(name, data):
     return name, hashlib.sha256(data).hexdigest(), len(data)
 
 
-def make_table(file, numbered_rows, decimal, log, hint=""):
+def make_table(file, numbered_rows, decimal, log, hint="", settings_file=SETTINGS_FILE):
     """Table of (row, cells) pairs, or None; blank rows and rows that start with # are left out.
 
     The first row that remains is the heading. Cells that are None stand for a row that cannot be
-    read, told already. `hint` ends the message about a row of too many cells.
+    read, told already. `hint` ends the message about a row of too many cells; `settings_file` says
+    which separator there is.
     """
     headings, heading_row, rows, numbers, skipped = None, 0, [], [], 0
     for number, raw_cells in numbered_rows:
@@ -298,7 +299,7 @@ def make_table(file, numbered_rows, decimal, log, hint=""):
         if not cells or (isinstance(cells[0], str) and cells[0].startswith("#")):
             continue
         if headings is None:
-            headings, heading_row = _headings(file, cells, number, log), number
+            headings, heading_row = _headings(file, cells, number, log, settings_file), number
             if headings is None:
                 return None
         elif len(cells) > len(headings):
@@ -334,7 +335,7 @@ def make_table(file, numbered_rows, decimal, log, hint=""):
     return Table(file, headings, heading_row, tuple(rows), tuple(numbers), decimal, skipped)
 
 
-def _headings(file, cells, number, log):
+def _headings(file, cells, number, log, settings_file):
     if len(cells) == 1 and isinstance(cells[0], str):
         for separator in SEPARATORS:
             if separator in cells[0]:
@@ -344,8 +345,9 @@ def _headings(file, cells, number, log):
                     message(
                         "other_separator",
                         "the cells are separated by '{name}'; expected the comma, or the "
-                        "separator under [csv] in job.toml",
+                        "separator under [csv] in {settings_file}",
                         name=name,
+                        settings_file=settings_file,
                     ),
                     number,
                 )

@@ -7,6 +7,7 @@ import pytest
 from packages import answers_of, write_answers, write_template, written_package
 
 from tankcal.cli import main
+from tankcal.errors import InputError
 from tankcal.intercomparison.answers import read_answers
 from tankcal.intercomparison.judging import score_folders
 from tankcal.job.tables import Log
@@ -188,7 +189,6 @@ def test_a_filled_form_is_scored(world):
     lambda one: one.update(format="other/1"),
 ])  # fmt: skip
 def test_bad_json_is_told(world, spoil):
-    from tankcal.errors import InputError
     from tankcal.record.plain_data import to_plain
 
     folder = world["tmp"] / "json"
@@ -199,3 +199,40 @@ def test_bad_json_is_told(world, spoil):
     with pytest.raises(InputError) as caught:
         scored(world, folder)
     assert len(caught.value.problems) == 1
+
+
+def test_a_table_of_a_million_rows_is_told_in_one_line(world):
+    path = world["folder"] / "T01_points.csv"
+    path.write_text("height_m,volume_m3\n" + "0.5,94\n" * 1000, "utf-8")
+    with pytest.raises(InputError) as told:
+        scored(world)
+    assert [one.expected.code for one in told.value.problems] == ["ic_too_many_rows"]
+
+
+def test_tables_beside_no_participant_are_read_by_the_marks_they_have(world):
+    """Their own problems are told with it, and none that a comma would make of ; in them."""
+    for path in world["folder"].glob("*.csv"):
+        text = path.read_text("utf-8").replace(",", ";").replace(".", ",")
+        path.write_text(text.replace("\n0,5;", "\n0,51;") if "T01" in path.name else text, "utf-8")
+    settings = world["folder"] / "participant.toml"
+    with pytest.raises(InputError) as told:
+        scored(world)
+    assert all("participant.toml" in str(one.expected) for one in told.value.problems)
+    for spoilt in ("[participant\n", None):
+        settings.unlink() if spoilt is None else settings.write_text(spoilt, "utf-8")
+        with pytest.raises(InputError) as told:
+            scored(world)
+        first, *others = told.value.problems
+        assert first.file == "participant.toml"
+        assert {one.expected.code for one in others} == {"ic_not_asked"}
+        assert {one.file[:3] for one in others} == {"T01"}
+
+
+def test_missing_heights_have_the_decimal_mark_of_the_language(world, capsys):
+    path = world["folder"] / "T01_points.csv"
+    lines = path.read_text("utf-8").splitlines()
+    path.write_text("\n".join([lines[0], *lines[3:]]) + "\n", "utf-8")
+    truth = str(world["truth"])
+    main(["intercomparison", "score", str(world["folder"]), "--truth", truth, "--language",
+          "pt-BR", "--quiet"])  # fmt: skip
+    assert "alturas sem volume (0,3 m, 0,5 m)" in capsys.readouterr().err

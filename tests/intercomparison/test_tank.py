@@ -1,5 +1,8 @@
 """Tanks drawn by lot: their volumes by a second method, and what the wall is where."""
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -172,3 +175,34 @@ def test_a_wave_of_the_bottom_counts():
     inside = np.hypot(x, y) < 7.0
     depth = -floor.height_m(x, y, 7.0)[inside].mean()
     assert_allclose(tank.volumes_m3(1.0), np.pi * 49.0 * (1.0 + depth), rtol=2e-5)
+
+
+def part_missed(tank, parts=(0.2, 0.8)):
+    """How far areas at these parts of each course are from the volume of the wall, in ppm."""
+    azimuth, read = 2 * np.pi * (np.arange(512) + 0.5) / 512, 0.0
+    for low, high in zip(tank.joints_m[:-1], tank.joints_m[1:], strict=True):
+        squares = [np.mean(tank.radii_m(azimuth, low + one * (high - low)) ** 2) for one in parts]
+        read += np.pi * np.mean(squares) * (high - low)
+    bare = replace(tank, floor=LEVEL, fittings=(), plate_z_m=0.0)
+    return 1e6 * (read / bare.volumes_m3([tank.height_m])[0] - 1)
+
+
+@pytest.mark.parametrize(("bell", "missed"), [(1.0, 0.154508), (0.0, 0.026667)])
+def test_readings_at_20_and_80_percent_miss_a_bulge(bell, missed):
+    """Closed form: means of (1 + cos)/2 and 1 - zeta^2, 1/2 and 2/3, less those at zeta = 0.6."""
+    joints = (0.0, 2.0, 4.0, 5.5)
+    bulges = [Course(low, high, 0.0, 0.0, 0.004, bell) for low, high in pairwise(joints)]
+    assert part_missed(make_tank(bulges)) == pytest.approx(-2e6 * 0.004 * missed / 7.0, rel=2e-3)
+
+
+@pytest.mark.slow
+def test_bulges_are_why_readings_at_20_and_80_percent_are_low():
+    """The same drawn walls with and without their bulges."""
+    for seed in range(3):
+        tank = draw_tank(np.random.default_rng(seed), "T", "round")
+        flat = [
+            replace(one, bulge_m=0.0) if isinstance(one, Course) else one for one in tank.defects
+        ]
+        assert part_missed(tank) < -5
+        assert abs(part_missed(replace(tank, defects=tuple(flat)))) < 0.5
+        assert abs(part_missed(tank, (0.15, 0.5, 0.85))) < 0.25 * abs(part_missed(tank))
