@@ -143,7 +143,8 @@ class Likelihood:
             return self.top(None, least_step)
         taken_at, reach, longest = np.full(len(best), np.inf), LOG_STEP, np.inf
         for _ in range(MOST_STEPS):
-            step = np.clip(-inverse @ there.slope, -reach, reach)
+            step = -inverse @ there.slope
+            step *= reach / max(np.abs(step).max(), reach)
             moved = np.clip(best + step, *self.bounds.T)
             before, longest = longest, np.abs(moved - best).max()
             if longest < least_step:
@@ -153,7 +154,7 @@ class Likelihood:
                 reach = longest / 4
                 continue
             inverse = improved(inverse, moved - best, further.slope - there.slope)
-            best, there = moved, further
+            best, there, reach = moved, further, min(2 * reach, LOG_STEP)
             ends = longest < AT_TOP or longest > before / 2
             if ends and np.abs(best - taken_at).max() > AT_TOP:
                 taken_at, inverse = best, self._inverse(there.curvature)
