@@ -143,7 +143,6 @@ def test_the_search_finds_the_very_top_and_its_curvature():
     assert near_by[1] == pytest.approx(covariance, rel=1e-4, abs=1e-5)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", [36, 37, 55, 58])
 def test_the_search_goes_on_to_the_top(seed):
     """Begun beside it: on these walls steps that only became shorter ended on the way up."""
