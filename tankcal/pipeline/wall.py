@@ -245,7 +245,8 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
             start_m2=_sizes_of(shell),
         )
     if amplitudes.noise != 1.0:  # it may be half a gigabyte
-        covariance, noise = covariance * amplitudes.noise, noise * amplitudes.noise
+        covariance = covariance * amplitudes.noise
+        noise *= amplitudes.noise
         to_fit = _to_fit(job, shell, accepted, groups, covariance)
     form_m2 = _form_m2(amplitudes)
     sections = tuple(fit_section(*one, form_m2) for one in to_fit)

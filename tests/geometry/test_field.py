@@ -222,6 +222,23 @@ EXACT = {
 }
 
 
+def test_the_average_curvature_is_half_of_what_the_readings_add():
+    """Property: readings enter the curvature twice as they enter its mean with the expected one."""
+    rng = np.random.default_rng(2)
+    sites = sites_of(3, [-0.6, 0.6], 12, rng)
+    radius = RADIUS_M + 0.004 * rng.normal(size=len(sites))
+    noise = np.full(len(sites), 1e-6)
+    evidence, nothing = (
+        likelihood_of(sites, one, noise, RADIUS_M, True) for one in (radius, 0 * radius)
+    )
+    at = evidence.middle + rng.normal(0, 0.5, len(evidence.middle))
+    told, untold = Misfit(evidence, at), Misfit(nothing, at)
+    by_slope = np.diag(told.slope - untold.slope)  # of logarithms
+    added = told.curvature - untold.curvature - by_slope
+    average = told.average_curvature - untold.average_curvature - by_slope
+    assert 2 * average == pytest.approx(added, rel=1e-9, abs=1e-9 * np.abs(added).max())
+
+
 @pytest.mark.parametrize("shape", EXACT)
 def test_exact_shapes_without_noise(shape, figure):
     """Closed form: three rings of 24 points a course, volumes of courses within 2 ppm."""

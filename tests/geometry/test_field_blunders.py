@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.optimize
+from generated_walls import make_wall, survey
 from test_field import RADIUS_M, sites_of
 
 from tankcal.geometry.clutter import find_rings
@@ -20,7 +21,7 @@ from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.evidence import likelihood_of
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, MIRRORED, invert
 from tankcal.geometry.field.precision import Precision
-from tankcal.geometry.field.sites import free_design
+from tankcal.geometry.field.sites import Sites, free_design
 
 STEP = 1e-4  # of a logarithm, in differences
 
@@ -140,6 +141,23 @@ def test_the_search_finds_the_very_top_and_its_curvature():
     near_by = evidence.top(best + 0.1)
     assert near_by[0] == pytest.approx(best, abs=1e-6)
     assert near_by[1] == pytest.approx(covariance, rel=1e-4, abs=1e-5)
+
+
+@pytest.mark.parametrize("seed", [36, 37, 55, 58])
+def test_the_search_goes_on_to_the_top(seed):
+    """Begun beside it: on these walls steps that only became shorter ended on the way up."""
+    rng = np.random.default_rng(seed)
+    wall = make_wall(rng, "rough", radius_m=6.0, courses=5)
+    one = survey(rng, wall, rings=3, points=12, noise_m=1e-3, layout="free")
+    count = len(one.zeta)
+    ring = np.repeat(np.arange(15), 12)
+    sites = Sites(one.course, ring, one.zeta, one.azimuth_rad, np.zeros(count, dtype=bool))
+    evidence = likelihood_of(sites, one.radius_m, np.full(count, 1e-6), 6.0, False)
+    near_by = evidence.near_top()
+    start = np.clip(near_by + rng.normal(size=len(near_by)), *evidence.bounds.T)
+    best, _ = evidence.top(start)
+    free = (best > evidence.bounds[:, 0]) & (best < evidence.bounds[:, 1])
+    assert np.abs(evidence.misfit(best)[1][free]).max() < 1e-4
 
 
 def test_a_matrix_that_is_larger_than_a_piece_is_inverted_whole():

@@ -8,13 +8,13 @@ Source: Patterson & Thompson 1971 (restricted maximum likelihood).
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import scipy.linalg
 
 from tankcal.geometry.field.misfit import Misfit, rounded
-from tankcal.geometry.field.search import descend
+from tankcal.geometry.field.search import descend, improved
 
 NOISE_MEDIAN_M, NOISE_LOG_SD = 2e-3, 3.0  # of readings without a given standard deviation
 LEAST_M, MOST_M = 1e-5, 0.3  # amplitudes that are tried
@@ -25,7 +25,8 @@ FAR = 150.0  # descent that a place still promises, fourfold, that is not near t
 MOST_STEPS, LOG_STEP = 60, 0.7  # on to the very top; of a logarithm at once
 SMALL_STEP, ROUGH_STEP = 1e-7, 0.03  # of a logarithm, that end a search
 MIRRORED = 64  # rows at once
-NEAR_TOP = 1e-4  # of a logarithm: so near the top the curvature is that of the top
+NEAR_TOP = 1e-4  # of a logarithm: so near the top a change of the value is rounding
+AT_TOP = 2e-5  # of a logarithm: so near the top the curvature is that of the top
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ class Likelihood:
         """
         if start is not None:
             return self.top(start, ROUGH_STEP)[0]
-        return descend(self.misfit, self.middle, self.log_sd, self.bounds, ROUGH)[0]
+        return descend(partial(Misfit, self), self.middle, self.log_sd, self.bounds, ROUGH)[0]
 
     def top(self, start=None, least_step=SMALL_STEP):
         """Logarithms of the highest density, and their covariance by the curvature there.
@@ -137,12 +138,13 @@ class Likelihood:
         """
         best = self.near_top() if start is None else start
         there = Misfit(self, best)
-        covariance = self._covariance(there)
-        if start is not None and there.slope @ covariance @ there.slope > FAR:
+        inverse = self._inverse(there.average_curvature)
+        if start is not None and 2 * there.slope @ inverse @ there.slope > FAR:
             return self.top(None, least_step)
-        taken_at, reach, longest = best, LOG_STEP, np.inf
+        taken_at, reach, longest = np.full(len(best), np.inf), LOG_STEP, np.inf
         for _ in range(MOST_STEPS):
-            step = np.clip(-covariance @ there.slope / 2, -reach, reach)
+            step = -inverse @ there.slope
+            step *= reach / max(np.abs(step).max(), reach)
             moved = np.clip(best + step, *self.bounds.T)
             before, longest = longest, np.abs(moved - best).max()
             if longest < least_step:
@@ -151,16 +153,20 @@ class Likelihood:
             if longest > NEAR_TOP and further.value > there.value:
                 reach = longest / 4
                 continue
-            best, there = moved, further
-            ends = longest < NEAR_TOP or longest > before / 2
-            if ends and np.abs(best - taken_at).max() > NEAR_TOP:
-                taken_at, covariance = best, self._covariance(there)
+            inverse = improved(inverse, moved - best, further.slope - there.slope)
+            best, there, reach = moved, further, min(2 * reach, LOG_STEP)
+            ends = longest < AT_TOP or longest > before / 2
+            if ends and np.abs(best - taken_at).max() > AT_TOP:
+                taken_at, inverse = best, self._inverse(there.curvature)
+                covariance = 2 * inverse
+        if np.abs(best - taken_at).max() > AT_TOP:
+            covariance = 2 * self._inverse(there.curvature)
         return best, covariance
 
-    def _covariance(self, there):
-        """By the curvature of the misfit's half, that is never below the prior's."""
-        values, vectors = np.linalg.eigh(there.curvature / 2)
-        return (vectors / np.maximum(values, 1 / self.log_sd.max() ** 2)) @ vectors.T
+    def _inverse(self, curvature):
+        """Of a curvature of the misfit, that is never below the prior's."""
+        values, vectors = np.linalg.eigh(curvature)
+        return (vectors / np.maximum(values, 2 / self.log_sd.max() ** 2)) @ vectors.T
 
 
 def prior_of(components, noise_m2=None):

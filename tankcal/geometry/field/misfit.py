@@ -62,9 +62,16 @@ class Misfit:
     @property
     def curvature(self):
         """(variances, variances) second derivative by the logarithms."""
-        by_variances = 2 * self._squares() - self._traces()
-        of_logs = self._variances * self._by_variances + 2 / self._likelihood.log_sd**2
-        return self._variances[:, None] * by_variances * self._variances + np.diag(of_logs)
+        return self._of_logs(2 * self._squares() - self._traces())
+
+    @property
+    def average_curvature(self):
+        """The mean of that and of the one that was expected: a tenth of the work."""
+        return self._of_logs(self._squares())
+
+    def _of_logs(self, by_variances):
+        along = self._variances * self._by_variances + 2 / self._likelihood.log_sd**2
+        return self._variances[:, None] * by_variances * self._variances + np.diag(along)
 
     @cached_property
     def _parts(self):

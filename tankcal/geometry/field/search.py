@@ -22,7 +22,7 @@ def descend(function, start, reach, bounds, tolerance):
     Parameters
     ----------
     function : callable
-        function(x) -> value, (n,) slope.
+        function(x) -> what has a `value`, and a `slope` (n,): it is asked where a step ends.
     start, reach : ndarray, shape (n,)
         Where the search begins, and how far about it the lowest place may be.
     bounds : ndarray, shape (n, 2)
@@ -35,13 +35,17 @@ def descend(function, start, reach, bounds, tolerance):
 
     Examples
     --------
-    >>> bowl = lambda x: (np.sum((x - 1) ** 2 * [1, 9]), 2 * (x - 1) * [1, 9])
+    >>> from types import SimpleNamespace
+    >>> def bowl(x):
+    ...     value, slope = np.sum((x - 1) ** 2 * [1, 9]), 2 * (x - 1) * [1, 9]
+    ...     return SimpleNamespace(value=value, slope=slope)
     >>> descend(bowl, np.zeros(2), np.ones(2), np.array([[-5, 5], [-5, 0.5]]), 1e-12)[0].round(6)
     array([1. , 0.5])
     """
     low, high = np.transpose(bounds)
     x, inverse = np.clip(start, low, high), np.diag(BEGIN * np.asarray(reach))
-    value, slope = function(x)
+    here = function(x)
+    value, slope = here.value, here.slope
     for _ in range(MOST_STEPS):
         free = ~((x <= low) & (slope > 0) | (x >= high) & (slope < 0))
         step = free * (inverse @ (free * -slope))
@@ -50,20 +54,21 @@ def descend(function, start, reach, bounds, tolerance):
         while True:
             there = np.clip(x + part * step, low, high)
             moved = there - x
-            lower, its_slope = function(there)
+            further = function(there)
+            lower = further.value
             if lower <= value + ENOUGH * slope @ moved or part < SHORTEST:
                 break
             part *= SHORTEN
         if not lower < value:
             break
-        inverse = _improved(inverse, moved, its_slope - slope)
-        gained, x, value, slope = value - lower, there, lower, its_slope
+        inverse = improved(inverse, moved, further.slope - slope)
+        gained, x, value, slope = value - lower, there, lower, further.slope
         if gained < tolerance * max(abs(value), 1.0):
             break
     return x, slope
 
 
-def _improved(inverse, moved, turned):
+def improved(inverse, moved, turned):
     """The inverse curvature after a step along which the slope turned by so much."""
     bend = moved @ turned
     if bend <= 0.0:
