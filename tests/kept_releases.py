@@ -117,9 +117,9 @@ def _inspected():
 
 
 def _main():
-    version = tankcal.__version__
-    if versions().get(version) != "unreleased":
-        sys.exit(f"{version} is released, or not in CHANGELOG.md: what is kept of it stays")
+    version = next((one for one, day in versions().items() if day == "unreleased"), None)
+    if version is None:
+        sys.exit("CHANGELOG.md has no unreleased version: what is kept of others stays")
     place = KEPT / version
     shutil.rmtree(place, ignore_errors=True)
     for name, (only, step) in JOBS.items():

@@ -380,8 +380,6 @@ def read_csv(file, data, separator, decimal, log, settings_file=SETTINGS_FILE):
             settings_file=settings_file,
         )
     separator = separator_of_blank(text) or separator
-    return make_table(file, _csv_rows(file, text, separator, log), decimal, log, hint)
-    separator = _separator_of_blank(text) or separator
     rows = _csv_rows(file, text, separator, log)
     return make_table(file, rows, decimal, log, hint, settings_file)
 

@@ -32,8 +32,10 @@ def read(path):
     return json.loads(lzma.decompress(path.read_bytes()))
 
 
-def test_the_version_that_is_made_is_in_the_changelog():
-    assert tankcal.__version__ in versions()
+def test_a_version_that_is_released_is_in_the_changelog():
+    """Between two releases the version has .dev, and the next number need not be known yet."""
+    released, development, _ = tankcal.__version__.partition(".dev")
+    assert development or released in versions()
 
 
 @pytest.mark.parametrize("version", sorted(versions()))
