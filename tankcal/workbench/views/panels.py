@@ -11,6 +11,7 @@ from tankcal.workbench.views.points import PointsPanel
 from tankcal.workbench.views.supposing import BudgetPanel
 
 WIDE = {"width": "100%"}
+WHOLE_TITLES = "<style>.tankcal-titled .lm-TabBar-tab { flex: 0 0 auto !important }</style>"
 
 
 def live_view(result, paper, on_overrule):
@@ -23,7 +24,9 @@ def live_view(result, paper, on_overrule):
     if result.table.sources:
         parts["views.budget"] = BudgetPanel(result, paper).box
     tabs = widgets.Tab(children=list(parts.values()), titles=[word(one) for one in parts])
-    return widgets.VBox([tabs], layout=WIDE)
+    view = widgets.VBox([widgets.HTML(WHOLE_TITLES), tabs], layout=WIDE)
+    view.add_class("tankcal-titled")
+    return view
 
 
 def frame_of(html, title):
