@@ -302,7 +302,7 @@ def test_nobody_decides_where_nobody_listens(widgets, english):
 
 def test_the_whole_view(widgets, result, record, heard):
     view = results_view(result, record, "pt-BR", lambda *given: heard.append(given))
-    (tabs,) = view.children
+    _, tabs = view.children
     assert list(tabs.titles) == ["Tabela", "Parede e pontos", "Balanço de incerteza"]
 
 
