@@ -1,15 +1,12 @@
 """`tankcal compare`: a former table and a new one of the same tank."""
 
-from pathlib import Path
-
 from tankcal.cli.arguments import add_language
-from tankcal.cli.machine import add_json, print_json
+from tankcal.cli.machine import add_json, print_saved
 from tankcal.cli.showing import (
     Progress,
     language_of_run,
     marks,
     prepare_for_small_work,
-    print_paths,
     say,
     speak_of_record,
     warn,
@@ -79,12 +76,7 @@ def _compare(options):
     if options.out is not None:
         written = write_comparison(found, options.out, language_of_run(), show.step)
     show.end()
-    if options.machine:
-        print_json(exit_status=0, **found)
-        return
-    _tell(found)
-    if written:
-        print_paths(Path(options.out), [path.name for path in written])
+    print_saved(options, found, _tell, written)
 
 
 def _tell(found):

@@ -1,15 +1,12 @@
 """`tankcal history`: the tables of one tank over the years."""
 
-from pathlib import Path
-
 from tankcal.cli.arguments import add_language, parse_dips
-from tankcal.cli.machine import add_json, print_json
+from tankcal.cli.machine import add_json, print_saved
 from tankcal.cli.showing import (
     Progress,
     language_of_run,
     marks,
     prepare_for_small_work,
-    print_paths,
     say,
     speak_of_record,
     warn,
@@ -91,12 +88,7 @@ def _history(options):
     if options.out is not None:
         written = write_history(found, options.out, language_of_run(), show.step)
     show.end()
-    if options.machine:
-        print_json(exit_status=0, **found)
-        return
-    _tell(found)
-    if written:
-        print_paths(Path(options.out), [path.name for path in written])
+    print_saved(options, found, _tell, written)
 
 
 def _tell(found):

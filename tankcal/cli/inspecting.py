@@ -1,14 +1,11 @@
 """`tankcal inspect`: plumb, roundness, welds and settlement of a tank by its survey."""
 
-from pathlib import Path
-
 from tankcal.cli.arguments import add_language, yield_mpa
-from tankcal.cli.machine import add_json, print_json
+from tankcal.cli.machine import add_json, print_saved
 from tankcal.cli.showing import (
     Progress,
     language_of_run,
     prepare_for_small_work,
-    print_paths,
     say,
     speak,
     warn,
@@ -94,12 +91,7 @@ def _inspect(options):
     if options.out is not None:
         written = write_inspection(found, options.out, language_of_run(), show.step)
     show.end()
-    if options.machine:
-        print_json(exit_status=0, **found)
-        return
-    _tell(found)
-    if written:
-        print_paths(Path(options.out), [path.name for path in written])
+    print_saved(options, found, _tell, written)
 
 
 def _tell(found):

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language, parse_count, refuse_argument
-from tankcal.cli.machine import add_json, print_json
+from tankcal.cli.machine import add_json, print_saved
 from tankcal.cli.showing import (
     Progress,
     language_of_run,
@@ -234,12 +234,7 @@ def _score(options):
     if options.out is not None:
         written = write_scores(found, options.out, language_of_run(), show.step)
     show.end()
-    if options.machine:
-        print_json(exit_status=0, **found)
-        return
-    _tell(found)
-    if written:
-        print_paths(Path(options.out), [path.name for path in written])
+    print_saved(options, found, _tell, written)
 
 
 def _refuse_existing(out):

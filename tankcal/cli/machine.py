@@ -2,7 +2,9 @@
 
 import json
 import sys
+from pathlib import Path
 
+from tankcal.cli.showing import print_paths
 from tankcal.errors import InputError, problem_of
 
 
@@ -20,6 +22,19 @@ def print_json(**values):
     """Print one object; numbers that do not exist are null."""
     json.dump(values, sys.stdout, ensure_ascii=False, allow_nan=False, indent=1)
     print()
+
+
+def print_saved(options, found, tell, written):
+    """Print what a command found, told by tell(found) in lines of text, and which files it wrote.
+
+    `written` are their paths below options.out; with `--json` one object is printed of `found`.
+    """
+    if options.machine:
+        print_json(exit_status=0, **found)
+        return
+    tell(found)
+    if written:
+        print_paths(Path(options.out), [path.name for path in written])
 
 
 def failure(error):

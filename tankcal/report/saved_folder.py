@@ -11,6 +11,17 @@ from tankcal.record.saved_formats import SavedFormat
 from tankcal.report import folders
 
 
+def write_pages(pages, paper, folder, file, page_file=None):
+    """Set pages(paper, folder) as a PDF, and pages(paper, whole=True) as a web page beside it."""
+    from tankcal.report.pdf import pdf
+    from tankcal.report.web import page
+
+    (folder / file).write_bytes(pdf([block.data for block in pages(paper, folder)], folder))
+    if page_file is not None:
+        whole = [block.data for block in pages(paper, whole=True)]
+        (folder / page_file).write_text(page(whole), encoding="utf-8")
+
+
 @dataclass(frozen=True)
 class SavedFolder:
     """What a command leaves behind: a saved file, and what is made from it alone.
@@ -52,6 +63,16 @@ class SavedFolder:
         except (OSError, ValueError, RecursionError) as error:
             raise InputError(Problem(name, self.unreadable(str(error)))) from error
         return self.saved_format.migrated(found, name)
+
+    def write(self, folder, fill, language=None, progress=None):
+        """Let fill(folder, progress) write the files, all or nothing; the paths of those made.
+
+        An earlier folder of this kind is replaced; InputError for one that holds anything else.
+        """
+        self.refuse_foreign(folder)
+        with folders.replaced(folder, language) as temporary:
+            fill(temporary, progress or (lambda text: None))
+        return [path for path in (Path(folder) / name for name in self.files) if path.exists()]
 
     def rebuild(self, source, write):
         """What write(found) gives of a saved file; InputError where its content is another."""

@@ -3,15 +3,15 @@
 Nothing here computes a number: all of it is made from comparison.json.
 """
 
-from pathlib import Path
+from functools import partial
 
 from tankcal.messages import message
 from tankcal.record import save
 from tankcal.record.comparison import COMPARISON, plain_of_comparison
-from tankcal.report import folders, manifest
+from tankcal.report import manifest
 from tankcal.report.comparison.paper import FILE, WORKBOOK, ComparisonPaper
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL
-from tankcal.report.saved_folder import SavedFolder
+from tankcal.report.saved_folder import SavedFolder, write_pages
 
 __all__ = [
     *("FILES", "ComparisonPaper", "comparison_file", "rebuild", "refuse_foreign"),
@@ -65,13 +65,9 @@ def write_comparison(found, folder, language=None, progress=None, letterhead=Non
     InputError
         For a folder that is not tankcal's to replace, and what is no comparison.
     """
-    refuse_foreign(folder)
-    progress = progress or (lambda text: None)
     plain = found if isinstance(found, dict) else plain_of_comparison(found)
     paper = ComparisonPaper(plain, language, letterhead)
-    with folders.replaced(folder, language) as temporary:
-        _write(paper, temporary, progress)
-    return [path for path in (Path(folder) / name for name in FILES) if path.exists()]
+    return _FOLDER.write(folder, partial(_write, paper), language, progress)
 
 
 def rebuild(source, folder, language=None, progress=None, letterhead=None):
@@ -85,8 +81,6 @@ def _write(paper, folder, progress):
     from tankcal.report.comparison import workbook
     from tankcal.report.comparison.pages import pages
     from tankcal.report.outputs.csv_files import write_table
-    from tankcal.report.pdf import pdf
-    from tankcal.report.web import page
 
     progress(message("comparison_tables", "writing the tables"))
     save(paper.saved, folder / FILE)
@@ -95,7 +89,4 @@ def _write(paper, folder, progress):
             write_table(table, folder / name, rows)
     workbook.write(paper, folder / WORKBOOK)
     progress(message("comparison_papers", "setting the papers"))
-    blocks = [block.data for block in pages(paper, folder)]
-    (folder / PDF).write_bytes(pdf(blocks, folder))
-    whole = [block.data for block in pages(paper, whole=True)]
-    (folder / PAGE).write_text(page(whole), encoding="utf-8")
+    write_pages(pages, paper, folder, PDF, PAGE)

@@ -3,12 +3,12 @@
 Nothing here computes a number: all of it is made from history.json.
 """
 
-from pathlib import Path
+from functools import partial
 
 from tankcal.messages import message
 from tankcal.record import save
 from tankcal.record.history import HISTORY, plain_of_history
-from tankcal.report import folders, manifest
+from tankcal.report import manifest
 from tankcal.report.history.paper import FILE, WORKBOOK, HistoryPaper
 from tankcal.report.history.tables import (
     CERTIFICATES,
@@ -22,7 +22,7 @@ from tankcal.report.history.tables import (
     radius_rows,
     volume_rows,
 )
-from tankcal.report.saved_folder import SavedFolder
+from tankcal.report.saved_folder import SavedFolder, write_pages
 
 __all__ = [
     *("FILES", "HistoryPaper", "history_file", "rebuild", "refuse_foreign"),
@@ -78,13 +78,9 @@ def write_history(found, folder, language=None, progress=None, letterhead=None):
     InputError
         For a folder that is not tankcal's to replace, and what is no history.
     """
-    refuse_foreign(folder)
-    progress = progress or (lambda text: None)
     plain = found if isinstance(found, dict) else plain_of_history(found)
     paper = HistoryPaper(plain, language, letterhead)
-    with folders.replaced(folder, language) as temporary:
-        _write(paper, temporary, progress)
-    return [path for path in (Path(folder) / name for name in FILES) if path.exists()]
+    return _FOLDER.write(folder, partial(_write, paper), language, progress)
 
 
 def rebuild(source, folder, language=None, progress=None, letterhead=None):
@@ -98,8 +94,6 @@ def _write(paper, folder, progress):
     from tankcal.report.history import workbook
     from tankcal.report.history.pages import pages
     from tankcal.report.outputs.csv_files import write_table
-    from tankcal.report.pdf import pdf
-    from tankcal.report.web import page
 
     progress(message("history_tables", "writing the tables of the history"))
     save(paper.saved, folder / FILE)
@@ -108,7 +102,4 @@ def _write(paper, folder, progress):
             write_table(table, folder / name, rows)
     workbook.write(paper, folder / WORKBOOK)
     progress(message("history_papers", "setting the papers of the history"))
-    blocks = [block.data for block in pages(paper, folder)]
-    (folder / PDF).write_bytes(pdf(blocks, folder))
-    whole = [block.data for block in pages(paper, whole=True)]
-    (folder / PAGE).write_text(page(whole), encoding="utf-8")
+    write_pages(pages, paper, folder, PDF, PAGE)

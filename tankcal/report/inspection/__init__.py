@@ -4,14 +4,14 @@ Nothing here computes a number: all of it is made from inspection.json. No part 
 capacity certificate.
 """
 
-from pathlib import Path
+from functools import partial
 
 from tankcal.messages import message
 from tankcal.record import save
 from tankcal.record.inspection import INSPECTION, plain_of_inspection
-from tankcal.report import folders, manifest
+from tankcal.report import manifest
 from tankcal.report.inspection.paper import FILE, WORKBOOK, InspectionPaper
-from tankcal.report.saved_folder import SavedFolder
+from tankcal.report.saved_folder import SavedFolder, write_pages
 
 __all__ = [
     *("FILES", "InspectionPaper", "inspection_file", "rebuild", "refuse_foreign"),
@@ -59,13 +59,9 @@ def write_inspection(found, out, language=None, progress=None, letterhead=None):
     InputError
         For a folder that is not tankcal's to replace, and what is no inspection.
     """
-    refuse_foreign(out)
-    progress = progress or (lambda text: None)
     plain = found if isinstance(found, dict) else plain_of_inspection(found)
     paper = InspectionPaper(plain, language, letterhead)
-    with folders.replaced(out, language) as temporary:
-        _write(paper, temporary, progress)
-    return [Path(out) / name for name in FILES]
+    return _FOLDER.write(out, partial(_write, paper), language, progress)
 
 
 def rebuild(source, out, language=None, progress=None, letterhead=None):
@@ -78,11 +74,9 @@ def rebuild(source, out, language=None, progress=None, letterhead=None):
 def _write(paper, folder, progress):
     from tankcal.report.inspection import workbook
     from tankcal.report.inspection.pages import pages
-    from tankcal.report.pdf import pdf
 
     progress(message("inspection_tables", "writing the tables of the inspection"))
     save(paper.saved, folder / FILE)
     workbook.write(paper, folder / WORKBOOK)
     progress(message("inspection_papers", "setting the papers of the inspection"))
-    blocks = [block.data for block in pages(paper, folder)]
-    (folder / PDF).write_bytes(pdf(blocks, folder))
+    write_pages(pages, paper, folder, PDF)
