@@ -10,6 +10,7 @@ import pytest
 from invented_language import bracketed, without_brackets
 from plan_folders import PLAN, changed_plan, with_setups
 
+import tankcal
 from tankcal.geometry.rotations import rotation_of_view, view_of_rotation
 from tankcal.planning import load_plan, predict
 from tankcal.planning.improvements import greedy, what_helps
@@ -214,6 +215,7 @@ def data_of(found):
     names += [str(text) for one in plan.job.measurements.instruments for text in
               (one.name, *one.details.values())]  # fmt: skip
     names += [one.camera.name for one in plan.job.measurements.cameras]
+    names.append(tankcal.__version__)
     return letters_in(names) | letters_in(unit.symbol for unit in UNITS.values()) | PROGRAM
 
 

@@ -350,7 +350,7 @@ def test_a_reading_that_nothing_controls_is_named(station):
 def test_csv_files_are_the_record_in_their_units(only):
     record, folder = only
     found = record["adjustment"]
-    assert {path.name for path in folder.iterdir()} == ONLY
+    assert {path.name for path in folder.iterdir()} == {*ONLY, "SHA256SUMS"}
     table = pd.read_csv(folder / "residuals.csv", keep_default_na=False, na_values=[""])
     assert len(table) == len(found["residuals"]["kind"])
     image = table[table.kind == "image coordinate"]
@@ -462,12 +462,11 @@ def test_without_papers_record_and_tables_are_written(job, only, tmp_path, capsy
     out = tmp_path / "out"
     command = ["run", str(job), "--only", "adjustment", "--out", str(out), "--quiet"]
     assert main([*command, "--no-papers"]) == 0
-    assert {path.name for path in out.iterdir()} == {
-        name for name in ONLY if name.endswith((".csv", ".json", ".npz"))
-    }
-    for path in out.iterdir():
-        if path.suffix != ".npz":
-            assert path.read_bytes() == (only[1] / path.name).read_bytes(), path.name
+    names = {name for name in ONLY if name.endswith((".csv", ".json", ".npz"))}
+    assert {path.name for path in out.iterdir()} == {*names, "SHA256SUMS"}
+    for name in names:
+        if not name.endswith(".npz"):
+            assert (out / name).read_bytes() == (only[1] / name).read_bytes(), name
     with pytest.raises(SystemExit, match="2"):
         main([*command, "--no-papers", "--letterhead", "letterhead.toml"])
 

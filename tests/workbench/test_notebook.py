@@ -161,14 +161,18 @@ def test_bad_addresses_are_told(folder, capsys, monkeypatch, arguments):
 
 
 def same_record(record, job):
-    """Is a record that of the job, computed anew by the calls that `tankcal run` makes?"""
+    """Is a record that of the job, computed anew by the calls that `tankcal run` makes?
+
+    Loops that are compiled and those that are not differ in the last digits.
+    """
     from tankcal.record import record_of, save
+    from tankcal.record.recomputation import compare_records
 
     fresh = record.with_name("fresh.json")
     save(record_of(tankcal.run(tankcal.load(job))), fresh)
     found, wanted = (json.loads(path.read_text(encoding="utf-8")) for path in (record, fresh))
     fresh.unlink()
-    return [key for key in wanted if found.get(key) != wanted[key]]
+    return compare_records(wanted, found).agrees
 
 
 @pytest.mark.slow
@@ -179,7 +183,7 @@ def test_nbconvert_writes_the_papers_of_the_job(tmp_path):
     notebook.write_text(json.dumps(made), encoding="utf-8")
     command = ["nbconvert", "--to", "html", "--execute", str(notebook)]
     subprocess.run([sys.executable, "-m", "jupyter", *command], check=True, capture_output=True)
-    assert same_record(tmp_path / "out" / "record.json", EXAMPLES / "silva-1995") == []
+    assert same_record(tmp_path / "out" / "record.json", EXAMPLES / "silva-1995")
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert {"certificate.pdf", "capacity.xlsx", "report.html"} <= names
     page = (tmp_path / "silva.html").read_text(encoding="utf-8")
@@ -198,7 +202,7 @@ def test_papermill_writes_the_papers_of_another_job(folder, tmp_path):
         parameters={"JOB": str(job), "OUT": str(out), "LANGUAGE": "pt-BR"},
         progress_bar=False,
     )
-    assert same_record(out / "record.json", job) == []
+    assert same_record(out / "record.json", job)
     assert (out / "certificate.pdf").exists()
 
 
@@ -226,4 +230,4 @@ def test_total_station_is_executed_like_the_others(tmp_path):
     made = make_notebook(EXAMPLES / "total-station", notebook, "pt-BR")
     made["cells"][1]["source"] += f"\nOUT = {str(tmp_path / 'out')!r}"
     executed(nbformat.from_dict(made), tmp_path)
-    assert same_record(tmp_path / "out" / "record.json", EXAMPLES / "total-station") == []
+    assert same_record(tmp_path / "out" / "record.json", EXAMPLES / "total-station")
