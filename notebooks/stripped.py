@@ -12,6 +12,8 @@ def main(arguments):
     dirty = []
     for folder in (name for name in arguments if name != "--fix"):
         for path in sorted(Path(folder).rglob("*.ipynb")):
+            if "results" in path.parts:  # what a notebook here made
+                continue
             notebook = nbformat.read(path, as_version=4)
             code = [cell for cell in notebook.cells if cell.cell_type == "code"]
             if any(cell.outputs or cell.execution_count for cell in code):
