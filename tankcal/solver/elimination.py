@@ -26,7 +26,7 @@ def _add_rows(batch, w, jac, normals):
             run._add_plain_rows(w, jac, batch.columns, normals.t, normals.g)
         else:
             run._add_rows(
-                w, jac, batch.block, batch.columns, batch.places, batch.turn, batch.runs,
+                w, jac, batch.block, batch.columns, batch.places, batch.cuts,
                 normals.v, normals.wide, normals.b, normals.t, normals.g,
             )  # fmt: skip
         return
@@ -47,7 +47,7 @@ def eliminate(plan, normals, damping, smallest):
     if is_worth_compiling():
         return compile_functions(loops, loops.COMPILED)._eliminate(
             normals.v, normals.wide, normals.b, plan.starts, plan.columns, plan.runs, plan.ends,
-            plan.turn, plan.alike, normals.t, normals.g, damping, smallest,
+            plan.alike, normals.t, normals.g, damping, smallest,
         )  # fmt: skip
     v = np.zeros((plan.blocks, 3, 3))
     v[:, *np.tril_indices(3)] = normals.v

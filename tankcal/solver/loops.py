@@ -11,12 +11,9 @@ unknowns stands once: S = T + T' - diag T.
 
 import numpy as np
 
-SUMMED = 64  # observations with the same columns that are squared at once
 TOGETHER = 32  # blocks with the same columns that are eliminated at once
-BY_HAND = 250  # elements; above it a product is worth a call of BLAS
+BY_HAND = 500  # elements; above it a product is worth a call of BLAS
 COMPILED = (
-    "_add_to_block",
-    "_add_squares",
     "_add_rows",
     "_add_plain_rows",
     "_root",
@@ -43,63 +40,45 @@ def _add_plain_rows(w, jac, columns, t, g):
                     t[c[a], c[b]] += f[a] * f[b]
 
 
-def _add_rows(w, jac, block, columns, places, turn, runs, v, wide, b, t, g):
-    for i in range(len(block)):
-        _add_to_block(w[i], jac[i], places[i], v[block[i]], wide, b[block[i]])
-    _add_squares(w, jac, columns, turn, runs, t, g)
-
-
-def _add_to_block(w, jac, p, v, wide, b):
-    m, k = jac.shape
-    for row in range(m):
-        line, r = jac[row], w[row]
-        e0, e1, e2 = line[0], line[1], line[2]
-        b[0] += e0 * r
-        b[1] += e1 * r
-        b[2] += e2 * r
-        v[0] += e0 * e0
-        v[1] += e1 * e0
-        v[2] += e1 * e1
-        v[3] += e2 * e0
-        v[4] += e2 * e1
-        v[5] += e2 * e2
-    for a in range(k - 3):
-        x0, x1, x2 = 0.0, 0.0, 0.0
+def _add_rows(w, jac, block, columns, places, cuts, v, wide, b, t, g):
+    n, m, k = jac.shape
+    for i in range(n):
+        c, p, o = columns[i], places[i], block[i]
         for row in range(m):
-            fa = jac[row, 3 + a]
-            x0 += fa * jac[row, 0]
-            x1 += fa * jac[row, 1]
-            x2 += fa * jac[row, 2]
-        to = wide[p[a]]
-        to[0] += x0
-        to[1] += x1
-        to[2] += x2
-
-
-def _add_squares(w, jac, columns, turn, runs, t, g):
-    """Rows turn[runs[k]] to turn[runs[k + 1]] have the same columns: their F'F is spread once."""
-    m, k = jac.shape[1], jac.shape[2] - 3
-    store, square = np.empty((m * SUMMED, k + 1)), np.empty((k + 1, k + 1))
-    total = np.empty((k + 1, k + 1))
-    for run in range(len(runs) - 1):
-        total[:] = 0.0
-        for begin in range(runs[run], runs[run + 1], SUMMED):
-            count = min(SUMMED, runs[run + 1] - begin)
-            for one in range(count):
-                i = turn[begin + one]
-                for row in range(m):
-                    line, part = store[m * one + row], jac[i, row]
-                    for a in range(k):
-                        line[a] = part[3 + a]
-                    line[k] = w[i, row]
-            rows = store[: m * count]
-            np.dot(rows.T, rows, square)
-            total += square
-        c = columns[turn[runs[run]]]
-        for a in range(k):
-            g[c[a]] += total[a, k]
-            for q in range(a, k):
-                t[c[a], c[q]] += total[a, q]
+            e, f, r = jac[i, row, :3], jac[i, row, 3:], w[i, row]
+            e0, e1, e2 = e[0], e[1], e[2]
+            b[o, 0] += e0 * r
+            b[o, 1] += e1 * r
+            b[o, 2] += e2 * r
+            v[o, 0] += e0 * e0
+            v[o, 1] += e1 * e0
+            v[o, 2] += e1 * e1
+            v[o, 3] += e2 * e0
+            v[o, 4] += e2 * e1
+            v[o, 5] += e2 * e2
+            for a in range(k - 3):
+                fa = f[a]
+                wide[p[a], 0] += fa * e0
+                wide[p[a], 1] += fa * e1
+                wide[p[a], 2] += fa * e2
+                g[c[a]] += fa * r
+        if m == 2:  # image coordinates: most of the work
+            f, h = jac[i, 0, 3:], jac[i, 1, 3:]
+            for one in range(len(cuts) - 1):
+                for a in range(cuts[one], cuts[one + 1]):
+                    fa, ha = f[a], h[a]
+                    for other in range(one, len(cuts) - 1):
+                        begin, end = max(a, cuts[other]), cuts[other + 1]
+                        line = t[c[a], c[begin] : c[begin] + end - begin]
+                        f1, h1 = f[begin:end], h[begin:end]
+                        for q in range(end - begin):
+                            line[q] += fa * f1[q] + ha * h1[q]
+        else:
+            for row in range(m):
+                f = jac[i, row, 3:]
+                for a in range(k - 3):
+                    for q in range(a, k - 3):
+                        t[c[a], c[q]] += f[a] * f[q]
 
 
 def _root(v, damping, smallest):
@@ -173,30 +152,30 @@ def _leave(t, columns, runs, first, y, product):
         _subtract(t, columns, runs, first, product)
 
 
-def _eliminate(v, wide, b, starts, columns, runs, ends, turn, alike, t, g, damping, smallest):
-    """Returns the number of a block that is not determined, or -1.
+def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, smallest):
+    """Returns the number of the first block that is not determined, or -1.
 
-    Blocks turn[alike[k]] to turn[alike[k + 1]] have the same columns: they leave t together.
+    Blocks alike[k] to alike[k + 1] have the same columns: they leave t together.
     """
     longest = 0
     for o in range(len(b)):
         longest = max(longest, starts[o + 1] - starts[o])
     store, square = np.empty(3 * TOGETHER * longest), np.empty(longest * longest)
     for k in range(len(alike) - 1):
-        model = turn[alike[k]]
-        first, n = starts[model], starts[model + 1] - starts[model]
+        first = starts[alike[k]]
+        n = starts[alike[k] + 1] - first
         mine = columns[first : first + n]
-        edges = ends[runs[model] : runs[model + 1] + 1]
+        edges = ends[runs[alike[k]] : runs[alike[k] + 1] + 1]
         for begin in range(alike[k], alike[k + 1], TOGETHER):
             count = min(TOGETHER, alike[k + 1] - begin)
             y = store[: 3 * count * n].reshape((3 * count, n))
-            for one in range(count):
-                o = turn[begin + one]
+            for o in range(begin, begin + count):
                 if not _root(v[o], damping, smallest):
                     return o
                 _forward(v[o], b[o])
+                row = 3 * (o - begin)
                 part = wide[starts[o] : starts[o] + n]
-                _forward_all(v[o], part, b[o], y[3 * one : 3 * one + 3], g, mine)
+                _forward_all(v[o], part, b[o], y[row : row + 3], g, mine)
             _leave(t, mine, edges, first, y, square[: n * n].reshape((n, n)))
     return -1
 

@@ -131,8 +131,7 @@ class Batch:
     order    (n, K) place in the group's derivatives of each of this batch's, or None (as they are)
     block    (n,) block whose derivatives come first, or None
     columns  (n, k) reduced column of each further derivative; a fixed unknown has the spare column
-    turn     (n,) the rows in an order in which those with the same columns follow each other
-    runs     where in `turn` rows with the same columns begin; n at the end
+    cuts     where runs of neighbouring columns, common to all these rows, begin; and k at the end
     places   (n, k) where column and block meet in the wide part; a spare place for the fixed ones
     """
 
@@ -141,8 +140,7 @@ class Batch:
     order: object
     block: object
     columns: np.ndarray
-    turn: np.ndarray
-    runs: np.ndarray
+    cuts: np.ndarray
     places: object
 
     def of(self, array):
@@ -163,9 +161,7 @@ class Plan:
     columns           (t,) reduced columns of all blocks, ascending in each
     ends              (s + 1,) where in `columns` runs of neighbouring columns begin, t at the end
     runs              (nb + 1,) where in `ends` each block begins
-    turn              (nb,) the blocks in an order in which those with the same columns follow each
-                      other
-    alike             where in `turn` blocks with the same columns begin; nb at the end
+    alike             where series of neighbouring blocks with the same columns begin; nb at the end
     """
 
     reduced: int
@@ -175,7 +171,6 @@ class Plan:
     columns: np.ndarray
     ends: np.ndarray
     runs: np.ndarray
-    turn: np.ndarray
     alike: np.ndarray
 
 
@@ -196,7 +191,7 @@ def plan(reduced, blocks, groups):
     np.cumsum(np.bincount(owner, minlength=blocks), out=starts[1:])
     batches = tuple(
         Batch(
-            g, rows, order, block, cols, *_alike(cols),
+            g, rows, order, block, cols, _cuts(cols, reduced),
             None if block is None else place[block[:, None], cols],
         )
         for g, rows, order, block, cols in raw
@@ -204,17 +199,19 @@ def plan(reduced, blocks, groups):
     begins = np.ones(len(columns), dtype=bool)
     begins[1:] = (np.diff(columns) != 1) | (np.diff(owner) != 0)
     ends = np.append(np.flatnonzero(begins), len(columns))
+    changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
+    alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
     runs = np.searchsorted(ends, starts)
-    return Plan(reduced, blocks, batches, starts, columns, ends, runs, *_alike(together))
+    return Plan(reduced, blocks, batches, starts, columns, ends, runs, alike)
 
 
-def _alike(rows):
-    """An order of rows (n, k) in which equal ones follow each other, and where each kind begins."""
-    n, k = rows.shape
-    # equal rows have equal sums; different ones whose sums agree by chance are told apart below
-    turn = np.argsort(rows @ np.random.default_rng(1).integers(1, 2**40, k), kind="stable")
-    changes = (rows[turn[1:]] != rows[turn[:-1]]).any(axis=1)
-    return turn, np.concatenate([np.flatnonzero(np.append(n > 0, changes)), [n]])
+def _cuts(columns, spare):
+    """Where runs begin: places at which some row's column is not the one after its neighbour."""
+    k = columns.shape[1]
+    if k == 0 or len(columns) == 0:
+        return np.arange(k + 1)
+    follows = (columns[:, 1:] == columns[:, :-1] + 1) & (columns[:, 1:] != spare)
+    return np.append(np.flatnonzero(np.append(True, ~follows.all(axis=0))), k)
 
 
 def _split(number, columns, reduced, blocks):
