@@ -19,6 +19,8 @@ from tankcal.batch.summary import changes_of
 from tankcal.cli import main
 from tankcal.cli.showing import speak
 
+pytestmark = pytest.mark.slow  # seconds of runs and papers
+
 
 @pytest.fixture(autouse=True)
 def plain_terminal(monkeypatch):

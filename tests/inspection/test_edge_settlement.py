@@ -11,6 +11,8 @@ from tankcal.inspection.levelling import RadialLine
 from tankcal.inspection.settlement_limits import BulgeLimits, EdgeLimits, largest_drop_mm
 from tankcal.job.tables import Log
 
+pytestmark = pytest.mark.slow  # seconds of fits
+
 R = np.arange(6.0, 10.61, 0.2)
 TRUE = (12.010, -0.008, -0.060, 9.5)  # z of the break, slopes inside and outside, its radius
 SHELL = 10.65

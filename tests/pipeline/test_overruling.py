@@ -15,6 +15,8 @@ import tankcal
 from tankcal.errors import InputError
 from tankcal.job.model import Overruling
 
+pytestmark = pytest.mark.slow  # seconds of runs and papers
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TURN = np.radians(7.5)  # between two points of a ring, 15 degrees apart
 DENT = ("dent", 6.46 * np.sin(TURN), 6.46 * np.cos(TURN), 5.225)  # 40 mm inside the wall of 6.5 m

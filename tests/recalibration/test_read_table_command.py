@@ -12,6 +12,8 @@ import tankcal
 from tankcal.cli import main
 from tankcal.recalibration.read_table import read_table
 
+pytestmark = pytest.mark.slow  # seconds of fits
+
 PLATES = np.array([0.010, 0.008, 0.006])
 HEIGHTS = np.array([1.9, 2.0, 1.8])
 LYING = [

@@ -46,6 +46,8 @@ from tankcal.report.pdf import pdf
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 
+pytestmark = pytest.mark.slow  # seconds of runs and papers
+
 LANGUAGE_OF = dict(zip(KINDS, [*LANGUAGES, "pt-BR"], strict=True))
 RULES = Path(tankcal.__file__).parent / "inspection" / "rules"
 PROGRAM = {"tankcal", "inspection", "mm", "xlsx"}  # and units

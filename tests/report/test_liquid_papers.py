@@ -26,6 +26,8 @@ from tankcal.report.web.tank_shape import tank_view
 from tankcal.text.languages import LANGUAGES
 from tankcal.text.words import load_words, translate_record
 
+pytestmark = pytest.mark.slow  # seconds of runs and papers
+
 EXAMPLES = "liquid", "liquid-lying"
 ADDED = ["by_factor", "by_meter_temperature", "by_tank_temperature", "by_shell", "by_head"]
 
