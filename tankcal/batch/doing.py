@@ -2,7 +2,6 @@
 
 import errno
 import os
-import time
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -191,17 +190,14 @@ def _run(task, clock):
 
 
 def _report(task, clock):
-    from tankcal.report import comparison, inspection, outputs
+    from tankcal.report import outputs
+    from tankcal.report.saved_rooms import room_of
 
     source, asked = _record(task), task.job.asked
-    others = (
-        (comparison.comparison_file(source), comparison.rebuild),
-        (inspection.inspection_file(source), inspection.rebuild),
-    )
     place, letterhead = _place(task, "report"), _letterhead(asked)
-    for saved, rebuild in others:
-        if saved is not None:
-            return rebuild(saved, place, asked.language, None, letterhead)
+    room, saved = room_of(source)
+    if room is not None:
+        return room.rebuild(saved, place, asked.language, None, letterhead)
     return outputs.rebuild(source, place, clock.progress, asked.language, letterhead)
 
 
@@ -236,7 +232,7 @@ def _export(task, clock):
     from tankcal.exports.profiles import find_profile
     from tankcal.report import folders
 
-    record, language = _record(task), None
+    record = _record(task)
     language = _language(task, record)
     export = export_record(record, find_profile(task.job.asked.profile), language=language)
     with folders.replaced(_place(task, "export")) as temporary:
@@ -309,4 +305,4 @@ class Clock:
 
 def _processor_s():
     found = os.times()
-    return found.user + found.system + found.children_user + found.children_system or time.time()
+    return found.user + found.system + found.children_user + found.children_system

@@ -9,20 +9,21 @@ import os
 import tomllib
 import zipfile
 from functools import lru_cache
-from hashlib import file_digest, sha256
+from hashlib import sha256
 from html import unescape
 from pathlib import Path
 
 import tankcal
+from tankcal.batch.finding import BOOK
 from tankcal.job.folder import OF_INSPECTIONS
 from tankcal.job.tables import COVARIANCE_FILE, SETTINGS_FILE
+from tankcal.report.manifest import digest_of
 
 NEVER_READ = (  # endings of what lies beside jobs
     *(".jpg", ".jpeg", ".png", ".tif", ".tiff", ".gif", ".bmp", ".dng", ".raw", ".heic"),
     *(".mp4", ".mov", ".avi", ".pdf", ".doc", ".docx", ".odt", ".zip", ".html"),
 )
 RESULTS = frozenset(("record.json", "comparison.json", "inspection.json", SETTINGS_FILE))
-BOOK = ".xlsx"
 MOST_UNPACKED_BYTES = 300_000_000  # of a workbook that is looked through for names
 OF_STEP = {  # attributes of `Asked` that bear on a step; of files their content
     "run": ("papers",),
@@ -148,5 +149,4 @@ def _digest(path):
 
 @lru_cache(maxsize=4096)
 def _digest_as_of(path, size, mtime_ns):
-    with open(path, "rb") as file:
-        return file_digest(file, "sha256").hexdigest()
+    return digest_of(path)

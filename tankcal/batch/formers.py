@@ -4,12 +4,12 @@ import os
 from functools import lru_cache
 from pathlib import Path
 
+from tankcal.batch.finding import RECORD
 from tankcal.batch.outcomes import known_names
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
 ENDINGS = (".toml", ".csv", ".xlsx", ".pdf", ".json")
-RECORD = "record.json"
 
 
 @lru_cache(maxsize=4)

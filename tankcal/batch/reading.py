@@ -7,8 +7,7 @@ from pathlib import Path
 from tankcal.batch.finding import RECORD, SAVED
 from tankcal.job.folder import OF_INSPECTIONS
 from tankcal.job.tables import SETTINGS_FILE
-
-VERDICTS = ("failed", "guard_band", "not_determined", "passed")  # of checks, the worst first
+from tankcal.record.inspection import VERDICTS
 
 
 def values_of(step, folder):

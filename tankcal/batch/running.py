@@ -135,9 +135,9 @@ def _workers_for(workers, waiting):
 
 def _unsettled(jobs, journal, batch, telling):
     """A `Task` of each job with something left to do; the others are counted as they were."""
-    text = message("batch_comparing", "looking at what is done already")
+    looking = message("batch_comparing", "looking at what is done already")
     for number, job in enumerate(jobs):
-        telling.part(text, number, len(jobs))
+        telling.part(looking, number, len(jobs))
         task = Task(job, {}, str(journal.out), journal.run)
         try:
             task = replace(task, keys=keys_of(job, former_or_none(job)))

@@ -12,7 +12,7 @@ SHELLS = ("bash", "zsh", "fish")
 FOLDERS = ("DIR",)
 NO_FILES = (  # arguments that are neither a file nor a folder
     "CODE", "NAME", "PATTERN", "TIME", "WHERE", "RULE", "FORM", "N", "I|II|LOW,RANGE",
-    "COLUMNSxROWS,START,START,STEP",
+    "COLUMNSxROWS,START,START,STEP", "ADDRESS", "ID", "STEPS",
 )  # fmt: skip
 EPILOG = """\
 for this session:  eval "$(tankcal completion bash)"
@@ -65,10 +65,15 @@ def names_that_ship():
     from tankcal.job import rule_files
     from tankcal.text.languages import LANGUAGES
 
+    profiles = tuple(shipped_profiles())
+    of_inspections, of_comparisons = rules.shipped_names(), rule_files.shipped_names()
     return {
-        ("export", "--profile"): (tuple(shipped_profiles()), True),
-        ("inspect", "--rule"): (rules.shipped_names(), True),
-        ("compare", "--rule"): (rule_files.shipped_names(), True),
+        ("export", "--profile"): (profiles, True),
+        ("inspect", "--rule"): (of_inspections, True),
+        ("compare", "--rule"): (of_comparisons, True),
+        ("batch", "--profile"): (profiles, True),
+        ("batch", "--inspect-by"): (of_inspections, True),
+        ("batch", "--compare-by"): (of_comparisons, True),
         ("report", "--language"): (LANGUAGES, False),
         ("docs", "page"): (page_names(), False),
         ("run", "--cluster"): (("auto", "local"), False),

@@ -79,9 +79,7 @@ def _add_template(commands):
         description="Write participant.toml and a table for each survey, with the heights that "
         "are asked and nothing else.",
     )
-    template.add_argument("package", metavar="PACKAGE", help="the folder of a package")
-    template.add_argument("--out", metavar="ANSWERS", required=True, help="the folder to make")
-    _add_common(template)
+    _add_package_and_answers(template)
     template.set_defaults(command=_template)
 
 
@@ -92,9 +90,7 @@ def _add_answer(commands):
         description="Run tankcal on every survey of a package and write the answers as any "
         "participant does.",
     )
-    answer.add_argument("package", metavar="PACKAGE", help="the folder of a package")
-    answer.add_argument("--out", metavar="ANSWERS", required=True, help="the folder to make")
-    _add_common(answer)
+    _add_package_and_answers(answer)
     answer.set_defaults(command=_answer)
 
 
@@ -118,6 +114,12 @@ def _add_score(commands):
     _add_common(score)
     add_json(score)
     score.set_defaults(command=_score)
+
+
+def _add_package_and_answers(parser):
+    parser.add_argument("package", metavar="PACKAGE", help="the folder of a package")
+    parser.add_argument("--out", metavar="ANSWERS", required=True, help="the folder to make")
+    _add_common(parser)
 
 
 def _add_common(parser):

@@ -58,24 +58,20 @@ def letterhead_of(options):
 
 
 def _report(options):
-    from tankcal.report import comparison, history, inspection, outputs
+    from tankcal.report import outputs
+    from tankcal.report.saved_rooms import room_of
 
     show = Progress(options.quiet)
     letterhead = letterhead_of(options)
-    others = (
-        (comparison.comparison_file(options.record), comparison.rebuild),
-        (inspection.inspection_file(options.record), inspection.rebuild),
-        (history.history_file(options.record), history.rebuild),
-    )
-    for saved, rebuild in others:
-        if saved is not None:
-            language = outputs.known_language(options.language)
-            speak(language)
-            out = Path(options.out) if options.out else saved.parent
-            paths = rebuild(saved, out, language, show.step, letterhead)
-            show.end()
-            print_paths(out, paths)
-            return
+    room, saved = room_of(options.record)
+    if room is not None:
+        language = outputs.known_language(options.language)
+        speak(language)
+        out = Path(options.out) if options.out else saved.parent
+        paths = room.rebuild(saved, out, language, show.step, letterhead)
+        show.end()
+        print_paths(out, paths)
+        return
     source = outputs.record_file(options.record)
     out = Path(options.out) if options.out else source.parent
     if options.language in LANGUAGES:

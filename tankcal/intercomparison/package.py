@@ -37,7 +37,6 @@ from tankcal.record.intercomparison import (
 LICENCE = "CC0-1.0"
 COVERAGE = 0.95
 DENSITIES_KG_M3 = (0.0, 850.0)  # of the head: tanks take turns
-MOST_TANKS = 100
 SCHEMA = "answers.schema.json"
 
 

@@ -393,13 +393,18 @@ def separator_of_blank(text):
     return SEPARATORS[0] if more is None and SEPARATORS[0] in heading and not others else None
 
 
+def is_row(line):
+    """Whether a line has cells: it is neither blank nor a comment."""
+    return bool(line) and not line.isspace() and not line.lstrip(' \t"').startswith("#")
+
+
 def _csv_rows(file, text, separator, log):
     """(row, cells) of each line that is neither blank nor a comment; cells is None when unreadable.
 
     A cell holds no line break, so that a forgotten quotation mark spoils one row, not the file.
     """
     for number, line in enumerate(_lines(text), 1):
-        if not line or line.isspace() or line.lstrip(' \t"').startswith("#"):
+        if not is_row(line):
             continue
         if '"' not in line:
             yield number, line.split(separator)

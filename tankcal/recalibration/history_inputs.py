@@ -16,7 +16,7 @@ from tankcal.recalibration.history import DatedTable, history_of
 from tankcal.recalibration.inputs import read_shell, rows_file
 from tankcal.recalibration.reading import read_former
 from tankcal.record.history import CheckInHistory, InspectionInHistory
-from tankcal.record.inspection import INSPECTION
+from tankcal.record.inspection import INSPECTION, VERDICTS
 
 RECORD = "record.json"
 MOST_NAMED = 10  # tanks, in a message
@@ -194,7 +194,7 @@ def _read(found, path, name, tanks, seen, is_sought):
     if kind.startswith(f"{INSPECTION.name}/"):
         _take_inspection(found, INSPECTION.migrated(saved, path.name), name, digest, tanks, seen)
     else:
-        _take_record(found, path, name, digest, tanks, seen)
+        _take_record(found, records.migrated(saved, path.name), path, name, digest, tanks, seen)
 
 
 def _may_name(content, tank):
@@ -225,8 +225,7 @@ def _is_again(found, name, digest, seen):
     return True
 
 
-def _take_record(found, path, name, digest, tanks, seen):
-    record = records.load(path)
+def _take_record(found, record, path, name, digest, tanks, seen):
     tank = ((record["job"] or {}).get("tank") or {}).get("id")
     if tanks and tank not in tanks:
         return
@@ -309,10 +308,10 @@ def _worst_checks(checks):
 
 
 def _gravity(check):
-    order = ("not_determined", "passed", "guard_band", "failed")
+    """How grave a figure is: what could not be judged hides behind nothing that passed."""
     value = abs(check["value"] or 0.0)
     limit = check["limit"] and check["limit"]["value"]
-    return order.index(check["verdict"]), value / limit if limit else value
+    return -VERDICTS.index(check["verdict"]), value / limit if limit else value
 
 
 def _refuse_several(found, tanks, paths):

@@ -18,7 +18,7 @@ CHECKS = (  # in the order of the papers
     "settlement_subset", "settlement_curvature", "settlement_de_beer", "edge_settlement",
     "bottom_bulge",
 )  # fmt: skip
-VERDICTS = ("passed", "guard_band", "failed", "not_determined")
+VERDICTS = ("failed", "guard_band", "not_determined", "passed")  # the gravest first
 
 
 class InspectedTank(Saved):

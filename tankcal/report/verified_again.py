@@ -214,17 +214,10 @@ def saved_folder(found, folder, again, manifest):
     """
     from tankcal.record.camera_versions import CAMERA
     from tankcal.record.plan import PLAN
-    from tankcal.report import comparison, history, inspection
+    from tankcal.report.saved_rooms import room_of
 
-    papers = (
-        (comparison.comparison_file, comparison),
-        (inspection.inspection_file, inspection),
-        (history.history_file, history),
-    )
-    for file_of, room in papers:
-        path = file_of(folder)
-        if path is None:
-            continue
+    room, path = room_of(folder)
+    if room is not None:
         room.load(path)
         _take(found, path)
         if again is not None:

@@ -7,6 +7,7 @@ Without widgets it does the same by calls:
     desk.problems, desk.save(), desk.run()
 """
 
+import datetime
 import os
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,9 +18,10 @@ from tankcal.job.tables import REGISTERS, TABLES
 from tankcal.report.folders import default_folder
 from tankcal.text.languages import DEFAULT, nearest_language
 from tankcal.workbench.computing import Run
+from tankcal.workbench.decimals import entered_text
 from tankcal.workbench.draft import Draft
 from tankcal.workbench.findings import BAD, DOUBTFUL
-from tankcal.workbench.keys import SETTINGS
+from tankcal.workbench.keys import SETTINGS, field_of
 from tankcal.workbench.plain import list_page, table_page, text_page
 from tankcal.workbench.shown import Reader
 
@@ -197,9 +199,6 @@ class Desk:
         text : str
         """
         if isinstance(row, str):
-            from tankcal.workbench.decimals import entered_text
-            from tankcal.workbench.keys import field_of
-
             typed = entered_text(field_of(name, row, column), text, ".", self.reader.mark)
             self.draft.set_value(name, row, column, typed)
         else:
@@ -278,8 +277,6 @@ class Desk:
         decision : {"keep", "leave_out"}
         reason : str
         """
-        import datetime
-
         draft, name = self.draft, "overrulings"
         columns = ("point", "decision", "reason", "date")
         given = {"point": point, "decision": decision, "reason": reason}

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from tankcal.job.contract import KEYS, REGISTER_KEYS
 from tankcal.job.contract.registers import FAMILIES, SHORT_KEYS
 from tankcal.job.fields import Field
-from tankcal.job.tables import REGISTERS
 from tankcal.text.numerals import NUMBER
 from tankcal.workbench.decimals import Unwritten
 
@@ -140,11 +139,6 @@ def field_of(name, owner, key):
         long = {short: one for one, short in SHORT_KEYS[name].items()}
         key = long.get(key, key)
     return next((one for one in fields if one.name == key), None)
-
-
-def owner_heading(name):
-    """ "section", "camera", "instrument" ...: what the owner of a key is called in a workbook."""
-    return REGISTERS.get(name, "section")
 
 
 def _text_of(value):

@@ -169,9 +169,6 @@ def head_panel(desk):
         except Refusal as error:
             say(desk, str(error))
             return
-        except OSError as error:
-            say(desk, word("not_saved", reason=error.strerror or str(error)))
-            return
         names = ", ".join(path.name for path in written)
         say(desk, word("saved", files=names) if written else word("nothing_to_save"))
 
@@ -277,7 +274,7 @@ class ResultsPanel:
 
         try:
             self.run = self.desk.begin(on_loop(self._tell), self.papers.value, on_loop(self._show))
-        except (Refusal, OSError) as error:
+        except Refusal as error:
             self._state(str(error))
             return
         self.button.disabled, self.stopper.disabled = True, False

@@ -7,7 +7,7 @@ What is not edited stays in the file byte for byte.
 import re
 from dataclasses import dataclass, replace
 
-from tankcal.job.folder import separator_of_blank
+from tankcal.job.folder import is_row, separator_of_blank
 from tankcal.workbench.decimals import Unwritten
 
 _ENDING = re.compile("\r\n|\r|\n")
@@ -225,11 +225,6 @@ def read_csv_table(name, file, text, separator, decimal):
 def new_csv_table(name, file, headings, separator, decimal):
     """EditedTable of a file that is not there yet, without rows."""
     return EditedTable(name, file, tuple(headings), (), decimal, CsvLines(separator))
-
-
-def is_row(line):
-    """Is it a line with cells, neither blank nor a comment? As `tankcal.job.folder` has it."""
-    return bool(line) and not line.isspace() and not line.lstrip(' \t"').startswith("#")
 
 
 def _lines(text):

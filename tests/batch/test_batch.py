@@ -15,6 +15,7 @@ from batch_jobs import bytes_of, jobs_in, journal_of, spoil, write_jobs
 from conftest import EXAMPLE
 
 from tankcal.batch import doing, journal, running
+from tankcal.batch.asked import Asked
 from tankcal.batch.summary import changes_of
 from tankcal.cli import main
 from tankcal.cli.showing import speak
@@ -495,3 +496,24 @@ def test_something_in_the_way_fails_that_job_alone(tmp_path, place, capsys):
     assert line.startswith(f"tankcal: T-0: {place}: is no file or folder of a batch (")
     rows = summary(tmp_path / "out")
     assert {name: row["status"] for name, row in rows.items()} == {"T-0": "failed", "T-1": "done"}
+
+
+def test_a_job_that_cannot_be_read_is_told_once(two, monkeypatch):
+    """The progress goes on with what it said before, not with the trouble of that job."""
+    site, out = two
+    real, parts, ended = running.keys_of, [], []
+
+    def keys_of(job, former):
+        if job.name == "T-0":
+            raise PermissionError(errno.EACCES, "Permission denied", "points.csv")
+        return real(job, former)
+
+    monkeypatch.setattr(running, "keys_of", keys_of)
+    telling = running.Telling(
+        part=lambda text, *_: parts.append(text.code), ended=lambda *told: ended.append(told)
+    )
+    batch = running.run_batch([str(site)], Asked(papers=False), out, workers=0, telling=telling)
+    assert parts == ["batch_comparing", "batch_comparing"]
+    ((name, status, problems, _),) = ended
+    assert (name, status, problems[0]["code"]) == ("T-0", "failed", "batch_input_unreadable")
+    assert batch.counts == {"failed": 1, "done": 1}

@@ -15,6 +15,7 @@ from packages import (
     written_package,
 )
 
+from tankcal.cli.intercomparison import METHODS as NAMED
 from tankcal.errors import InputError
 from tankcal.intercomparison.judging import score_folders
 from tankcal.intercomparison.observers import METHODS as ALL
@@ -122,3 +123,8 @@ def test_no_truth_is_told(tmp_path, text):
     answers = write_answers(tmp_path / "a", answers_of(manifest, content))
     truth.write_text(text, encoding="utf-8")
     assert len(told(score_folders, [answers], truth)) == 1
+
+
+def test_the_command_names_every_method():
+    """The parser has their names by itself: to load the crews takes long."""
+    assert tuple(ALL) == NAMED

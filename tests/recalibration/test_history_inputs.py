@@ -13,7 +13,7 @@ from tables_of_s1 import former_s1
 from tankcal.cli import main
 from tankcal.cli.showing import speak
 from tankcal.errors import InputError
-from tankcal.recalibration.history_inputs import find_files, history_of_files
+from tankcal.recalibration.history_inputs import _worst_checks, find_files, history_of_files
 from tankcal.record.history import HISTORY
 
 RECORDS = Path(__file__).parents[1] / "records" / "1"
@@ -219,3 +219,25 @@ def test_columns_of_unequal_length_are_told(archive, column):
     assert any(f"capacity.{column}" in str(one) or column == "volume_m3"
                for one in told.value.problems)  # fmt: skip
     assert all(one.file == "2019/T-1/record.json" for one in told.value.problems)
+
+
+def test_what_could_not_be_judged_hides_behind_nothing_that_passed():
+    """Property: of several places of a check the history shows the gravest verdict."""
+    limit = {"value": 10.0}
+    found = [
+        {
+            "code": "peaking",
+            "unit": "mm",
+            "value": value,
+            "U": 1.0,
+            "limit": limit,
+            "verdict": verdict,
+        }
+        for value, verdict in ((3.0, "passed"), (None, "not_determined"), (8.0, "passed"))
+    ]
+    assert [one.verdict for one in _worst_checks(found)] == ["not_determined"]
+    failed = found[0] | {"value": 12.0, "verdict": "failed"}
+    (worst,) = _worst_checks([*found, failed])
+    assert (worst.value, worst.verdict) == (12.0, "failed")
+    (worst,) = _worst_checks([found[0], found[2]])
+    assert worst.value == 8.0

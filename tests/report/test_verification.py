@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ import tankcal
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.report.comparison import write_comparison
+from tankcal.report.manifest import PACKAGES
 from tankcal.report.verification import verify
 
 pytestmark = pytest.mark.slow
@@ -398,3 +400,16 @@ def test_other_folders_say_what_cannot_be_verified(tmp_path):
     (out / "comparison.json").write_text("{}", encoding="utf-8")
     with pytest.raises(InputError):
         verify(out)
+
+
+def test_packages_of_the_manifest_are_those_that_make_papers(job):
+    """What a run loads is named; a package that makes no paper would tell papers apart in vain."""
+    code = f"""
+import sys
+from tankcal.cli import main
+main(["run", {str(job)!r}, "--quiet"])
+print(*sys.modules)"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.split())
+    assert {name for name in PACKAGES if name != "pypdf"} <= loaded  # a field to sign in: not here
+    assert loaded.isdisjoint({"pandas", "nbformat", "nbclient", "ipykernel"})

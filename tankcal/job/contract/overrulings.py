@@ -10,7 +10,7 @@ from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.fields import Field
 from tankcal.messages import message
 
-KEEP, LEAVE_OUT = DECISIONS = ("keep", "leave_out")
+DECISIONS = ("keep", "leave_out")
 _BESIDE = ("targets", "photos", "setups", "check", "fiducials", "film", "correlated_readings")
 READINGS = tuple(name for name in OF_SURVEYS if name not in (*_BESIDE, "control"))
 _NAMELESS = (

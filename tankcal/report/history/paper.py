@@ -50,7 +50,3 @@ class HistoryPaper(SavedPaper):
     def newest(self):
         """The newest certificate."""
         return self.found["certificates"][-1]
-
-    def of_certificate(self, number):
-        """The certificate of that number."""
-        return self.found["certificates"][number - 1]

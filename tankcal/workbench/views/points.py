@@ -6,10 +6,9 @@ import ipywidgets as widgets
 import traitlets
 
 from tankcal.errors import InputError, TankcalError
+from tankcal.job.contract.overrulings import DECISIONS
 from tankcal.report.web.wall_map import looked_at, why
 from tankcal.text.words import say
-
-DECISIONS = ("keep", "leave_out")
 
 
 class PointsPanel(traitlets.HasTraits):
