@@ -19,9 +19,9 @@ from tankcal.batch.outcomes import JOBS
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.report import folders
+from tankcal.report.batch import FILES as SUMMARY
 
 LOCK, JOURNAL = "batch.lock", "journal.jsonl"
-SUMMARY = ("summary.json", "summary.csv", "summary.xlsx", "summary.html")
 FILES = (LOCK, JOURNAL, JOBS, *SUMMARY)
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from tankcal.batch.asked import FOLDERS, STEPS
 from tankcal.batch.kept_data import is_step
+from tankcal.report.batch.paper import STATUSES
 
 JOBS, FILE, FORMAT = "jobs", "outcome.json", "tankcal-outcome/1"
-STATUSES = ("done", "unsound", "refused", "failed")  # from the best to the worst
 FINAL = ("done", "unsound", "refused")  # what the same input would give again
 MOST_TOLD = 20  # problems and warnings of a step that are kept
 

@@ -20,7 +20,6 @@ from tankcal.cli.showing import (
 )
 from tankcal.errors import Problem, SolutionError, problem_of
 from tankcal.messages import message
-from tankcal.report.folders import default_folder
 from tankcal.text.digits import decimals_of_height, fixed, format_significant, format_with_u
 
 DECIMALS_WITHOUT_U = 3  # of a volume in m3: litres
@@ -93,6 +92,8 @@ def _add_run(commands):
 
 def _run(options):
     source = Path(options.job)
+    from tankcal.report.folders import default_folder
+
     out = Path(options.out) if options.out else default_folder(source)
     compute = partial(_adjust if options.only == "adjustment" else _compute, options.cluster)
     tell = _tell_machine if options.machine else _tell

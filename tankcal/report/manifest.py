@@ -8,7 +8,6 @@ import hashlib
 import platform
 import re
 from dataclasses import dataclass, field
-from importlib import metadata
 from pathlib import Path
 
 import tankcal
@@ -58,6 +57,8 @@ def maker():
 
 
 def _version(name):
+    from importlib import metadata  # takes as long to load as the rest of a command's help
+
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:

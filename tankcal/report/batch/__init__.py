@@ -9,7 +9,7 @@ from tankcal.report.batch.paper import SummaryPaper
 from tankcal.report.batch.tables import FILE_OF_JOBS
 from tankcal.report.outputs.csv_files import write_table
 
-JSON, CSV, WORKBOOK, PAGE = "summary.json", "summary.csv", "summary.xlsx", "summary.html"
+FILES = JSON, CSV, WORKBOOK, PAGE = "summary.json", "summary.csv", "summary.xlsx", "summary.html"
 
 
 def summary_files(found, language, folder):
@@ -34,4 +34,4 @@ def summary_files(found, language, folder):
     workbook.write(paper, folder / WORKBOOK)
     blocks = [one.data for one in pages(paper)]
     (folder / PAGE).write_text(page(blocks), encoding="utf-8", errors="replace")
-    return [JSON, CSV, WORKBOOK, PAGE]
+    return [*FILES]

@@ -3,10 +3,10 @@
 from collections import Counter
 
 from tankcal.report import blocks
+from tankcal.report.batch.paper import STATUSES
 from tankcal.report.batch.tables import JOBS
 
 MOST_ROWS = 5000  # of the page: more are only in workbook and CSV, those that are not done first
-STATUSES = ("done", "unsound", "refused", "failed")  # from the best to the worst
 MOST_GONE = 20
 WRAPPED = ("changes", "told")  # columns whose cells are sentences
 

@@ -7,6 +7,7 @@ from tankcal.report.plain import PlainPaper, words_with_part
 from tankcal.report.saved_paper import signed_text
 from tankcal.text.words import load_words, say
 
+STATUSES = ("done", "unsound", "refused", "failed")  # of a job, from the best to the worst
 MOST_CHANGES = 3  # that a cell tells
 OF_RULE = {  # codes of verdicts in words of their own: short ones
     "rule_verdict": "rule_verdicts",

@@ -12,35 +12,37 @@ from tankcal.report.comparison.tables import (
     waterfall_of,
 )
 from tankcal.report.comparison.verdict import DECIMALS_OF_LIMITED
-from tankcal.report.workbook.book import Book
+from tankcal.report.workbook.book import Book, about_saved
 from tankcal.report.workbook.look import Column as Cells
-from tankcal.report.workbook.tables import columns_of, set_widths, write_table
+from tankcal.report.workbook.tables import (
+    HEAD_ROW,
+    columns_of,
+    set_widths,
+    table_sheet,
+    write_table,
+)
 
-HEAD_ROW = 3
 WIDTHS = (30, 34, 34, 12, 12, 24, 40, 12)
 
 
 def write(paper, path):
     """Write the workbook of a ComparisonPaper; the same comparison gives the same bytes."""
-    with Book(path, _as_record(paper.found), paper.words, about="comparison") as book:
+    with Book(path, _about(paper.found), paper.words, about="comparison") as book:
         book.paper = paper
         _verdict(book, paper)
-        _rows(book, paper)
+        table_sheet(book, "rows", ROWS, ROWS.rows(paper.found))
         _others(book, paper)
 
 
-def _as_record(found):
-    """What a Book asks of a record: whose the workbook is, and the day."""
+def _about(found):
     new = found["new"]
-    return {
-        "tankcal": found["tankcal"],
-        "capacity": None,
-        "job": {
-            "certificate": {"laboratory": new["laboratory"], "notice": found["notice"]},
-            "tank": {"id": found["tank"] or found["former"]["name"]},
-            "survey": {"date": new["date"]},
-        },
-    }
+    return about_saved(
+        found["tankcal"],
+        tank=found["tank"] or found["former"]["name"],
+        date=new["date"],
+        notice=found["notice"],
+        laboratory=new["laboratory"],
+    )
 
 
 def _verdict(book, paper):
@@ -109,15 +111,6 @@ def _read(paper):
 
 def _column(paper, key, cells, digits=None):
     return Cells(paper.word(f"table_headings.{key}"), cells, digits)
-
-
-def _rows(book, paper):
-    """Every row, with headings that stay in sight."""
-    sheet = book.sheet("rows", landscape=True, tab="result")
-    columns = columns_of(book, ROWS, ROWS.rows(paper.found))
-    widths = set_widths(book, sheet, columns)
-    book.table(sheet, HEAD_ROW, ROWS.name, columns, autofilter=True, widths=widths)
-    book.freeze(sheet, HEAD_ROW, 1)
 
 
 def _others(book, paper):

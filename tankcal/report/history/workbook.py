@@ -12,10 +12,9 @@ from tankcal.report.history.tables import (
     radius_rows,
     volume_rows,
 )
-from tankcal.report.workbook.book import Book
-from tankcal.report.workbook.tables import columns_of, set_widths
+from tankcal.report.workbook.book import Book, about_saved
+from tankcal.report.workbook.tables import HEAD_ROW, table_sheet
 
-HEAD_ROW = 3
 OF_ORIGINS = ("certificate", "tank", "origin", "tankcal", "method", "file", "sha256")
 OF_TABLES = (
     "certificate", "date", "superseded", "number", "laboratory", "top_dip_m", "top_volume_m3",
@@ -28,7 +27,7 @@ OF_TABLES = (
 def write(paper, path):
     """Write the workbook of a HistoryPaper; the same history gives the same bytes."""
     found = paper.found
-    with Book(path, _as_record(paper), paper.words, about="history") as book:
+    with Book(path, _about(paper), paper.words, about="history") as book:
         book.paper = paper
         certificates = found["certificates"]
         sheets = {
@@ -41,34 +40,19 @@ def write(paper, path):
         }
         for code, (table, rows) in sheets.items():
             if rows:
-                _sheet(book, code, table, rows)
+                table_sheet(book, code, table, rows)
         _warnings(book, paper)
 
 
-def _as_record(paper):
-    """What a Book asks of a record: whose the workbook is, and the day."""
-    newest = paper.newest
-    return {
-        "tankcal": paper.found["tankcal"],
-        "capacity": None,
-        "job": {
-            "certificate": {
-                "laboratory": newest["laboratory"],
-                "notice": paper.found["notice"],
-            },
-            "tank": {"id": paper.found["tank"] or newest["file"]},
-            "survey": {"date": newest["date"]},
-        },
-    }
-
-
-def _sheet(book, code, table, rows):
-    """A table on a sheet of its own, with headings that stay in sight."""
-    sheet = book.sheet(code, landscape=True, tab="result")
-    columns = columns_of(book, table, rows)
-    widths = set_widths(book, sheet, columns)
-    book.table(sheet, HEAD_ROW, table.name, columns, autofilter=True, widths=widths)
-    book.freeze(sheet, HEAD_ROW, 1)
+def _about(paper):
+    found, newest = paper.found, paper.newest
+    return about_saved(
+        found["tankcal"],
+        tank=found["tank"] or newest["file"],
+        date=newest["date"],
+        notice=found["notice"],
+        laboratory=newest["laboratory"],
+    )
 
 
 def _warnings(book, paper):

@@ -23,16 +23,14 @@ from tankcal.report.inspection.tables import (
     sheet_rows,
 )
 from tankcal.report.saved_paper import bearable
-from tankcal.report.workbook.book import Book
-from tankcal.report.workbook.tables import columns_of, set_widths, write_table
-
-HEAD_ROW = 3
+from tankcal.report.workbook.book import Book, about_saved
+from tankcal.report.workbook.tables import HEAD_ROW, columns_of, set_widths, write_table
 
 
 def write(paper, path):
     """Write the workbook of an InspectionPaper; the same inspection gives the same bytes."""
     found = paper.found
-    with Book(path, _as_record(found), paper.words, about="inspection") as book:
+    with Book(path, _about(found), paper.words, about="inspection") as book:
         book.paper = paper
         _checks(book, paper)
         sheets = {
@@ -51,17 +49,14 @@ def write(paper, path):
                 _sheet(book, code, [(table, rows) for table, rows in tables if rows])
 
 
-def _as_record(found):
-    """What a Book asks of a record: whose the workbook is, and the day."""
-    return {
-        "tankcal": found["tankcal"],
-        "capacity": None,
-        "job": {
-            "certificate": {"notice": found["notice"]},
-            "tank": {"id": bearable(found["tank"]["id"])},
-            "survey": {"date": found["tank"]["survey_date"]},
-        },
-    }
+def _about(found):
+    tank = found["tank"]
+    return about_saved(
+        found["tankcal"],
+        tank=bearable(tank["id"]),
+        date=tank["survey_date"],
+        notice=found["notice"],
+    )
 
 
 def _checks(book, paper):

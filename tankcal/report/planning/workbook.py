@@ -10,16 +10,15 @@ from tankcal.report.plain import Column
 from tankcal.report.planning import sketches
 from tankcal.report.planning.stands import stands
 from tankcal.report.planning.tables import field_tables
-from tankcal.report.workbook.book import Book
+from tankcal.report.workbook.book import Book, about_saved
 from tankcal.report.workbook.look import Column as Cells
-from tankcal.report.workbook.tables import set_widths
+from tankcal.report.workbook.tables import HEAD_ROW, set_widths
 
 ONE_A_SHEET = ("targets", "others", "stations", "photographs", "setups", "ties", "control")
 EQUIPMENT = ("cameras", "instruments")
 SKETCHES = {"wall": sketches.wall, "stands": stands}
 FIRST = {"targets": ("point", "line", "row")}  # columns of a sheet before those of the paper
 COUNTED = ("line", "row", "course")  # names that sort as numbers where they are
-HEAD_ROW = 3
 LONGEST = 30  # letters of a column that wraps no text
 DPI, PT, ROOM_PT = 110, 72.0, 8.0
 
@@ -27,7 +26,7 @@ DPI, PT, ROOM_PT = 110, 72.0, 8.0
 def write(paper, path):
     """Write the workbook of a PlanPaper; the same plan gives the same bytes."""
     tables = field_tables(paper.prediction)
-    with Book(path, _as_record(paper), paper.words, about="plan") as book:
+    with Book(path, _about(paper.plan.job), paper.words, about="plan") as book:
         _draw(book, paper)
         for name in ONE_A_SHEET:
             if name in tables:
@@ -37,18 +36,8 @@ def write(paper, path):
             _sheet(book, paper, "equipment", found)
 
 
-def _as_record(paper):
-    """What a Book asks of a record: whose the workbook is, and the day."""
-    job = paper.plan.job
-    return {
-        "tankcal": tankcal.__version__,
-        "capacity": None,
-        "job": {
-            "certificate": {},
-            "tank": {"id": job.tank.id},
-            "survey": {"date": job.survey.date},
-        },
-    }
+def _about(job):
+    return about_saved(tankcal.__version__, tank=job.tank.id, date=job.survey.date)
 
 
 def _sheet(book, paper, code, tables):

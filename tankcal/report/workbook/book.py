@@ -34,6 +34,23 @@ def header_text(text):
     return " ".join(str(text).split())[:50].replace("&", "&&")
 
 
+def about_saved(version, *, tank=None, source="", date=None, notice="", laboratory=""):
+    """What a Book asks of a record, for a saved file that is none: whose it is, and the day.
+
+    version  of tankcal        tank  its id; None: the workbook is about `source`
+    """
+    return {
+        "tankcal": version,
+        "capacity": None,
+        "job": {
+            "certificate": {"laboratory": laboratory, "notice": notice},
+            "tank": None if tank is None else {"id": tank},
+            "source": source,
+            "survey": None if date is None else {"date": date},
+        },
+    }
+
+
 class Book(Writer):
     """A workbook being written; as a context manager it is closed, that is saved, at the end.
 

@@ -7,6 +7,8 @@ from tankcal.report.tables import decimals_of_cells
 from tankcal.report.workbook.look import Column, width_of
 from tankcal.text.digits import NOTHING, decimals_of
 
+HEAD_ROW = 3  # of a table that has a sheet of its own
+
 
 def columns_of(book, table, rows=None):
     """The columns of a declared Table as cells, of these rows (None: its own of the record)."""
@@ -62,6 +64,19 @@ def set_widths(book, sheet, *tables, least=()):
     widths = [max(shared) for shared in zip_longest(least, *of_tables, fillvalue=0)]
     book.widths(sheet, *widths)
     return widths
+
+
+def table_sheet(book, code, table, rows):
+    """A declared table on a sheet of its own, with headings that stay in sight.
+
+    Gives the sheet and the columns.
+    """
+    sheet = book.sheet(code, landscape=True, tab="result")
+    columns = columns_of(book, table, rows)
+    widths = set_widths(book, sheet, columns)
+    write_table(book, sheet, HEAD_ROW, table.name, columns, autofilter=True, widths=widths)
+    book.freeze(sheet, HEAD_ROW, 1)
+    return sheet, columns
 
 
 def write_table(book, sheet, row, name, columns, **more):
