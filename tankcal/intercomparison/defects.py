@@ -128,8 +128,7 @@ class Dent(Defect):
         return self.size_m * cap_of(arc / self.half_width_m) * cap_of(_zeta(self, z))
 
     def kinks_rad(self, radius_m):
-        half = self.half_width_m / radius_m
-        return (self.azimuth_rad - half, self.azimuth_rad + half)
+        return _sides(self, radius_m)
 
 
 @dataclass(frozen=True)
@@ -146,8 +145,7 @@ class Flat(Defect):
         return -chord * _faded(self, z)
 
     def kinks_rad(self, radius_m):
-        half = self.half_width_m / radius_m
-        return (self.azimuth_rad - half, self.azimuth_rad + half)
+        return _sides(self, radius_m)
 
     def edges_m(self):
         return _faded_edges(self)
@@ -169,8 +167,7 @@ class Buckle(Defect):
         )
 
     def kinks_rad(self, radius_m):
-        half = self.half_width_m / radius_m
-        return (self.azimuth_rad - half, self.azimuth_rad + half)
+        return _sides(self, radius_m)
 
 
 KINDS = {one.__name__.lower(): one for one in (Oval, Seam, Band, Course, Dent, Flat, Buckle)}
@@ -185,6 +182,12 @@ def defect_of(plain):
     """The defect of plain data."""
     values = dict(plain)
     return KINDS[values.pop("kind")](**values)
+
+
+def _sides(defect, radius_m):
+    """Azimuths at which a patch begins and ends."""
+    half = defect.half_width_m / radius_m
+    return (defect.azimuth_rad - half, defect.azimuth_rad + half)
 
 
 def _zeta(defect, z):
