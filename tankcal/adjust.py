@@ -26,6 +26,7 @@ from tankcal.messages import message
 ALPHA, POWER = 0.001, 0.80  # of every test of single readings, and of the blunder it can show
 CRITICAL = 3.29  # of a test statistic: ALPHA, two-sided normal, to the digits of the field
 WELL_PLACED = 1e-3  # pivot of those that loses three digits of sixteen: above it they will do
+TIED = 9  # digits of test statistics: two readings that control each other alone differ by rounding
 SMALLEST_PIVOT = 1e-12  # of normal equations with ones in the diagonal: below it is rounding
 
 
@@ -232,7 +233,8 @@ def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=Fa
     returns : int
         Times that a candidate may come back: all that agree the first time, later one by one.
     choose : callable, optional
-        choose(adjustment, goes, statistic) -> (k,) bool, those of `goes` that do go; None: all.
+        choose(adjustment, goes, share) -> (k,) bool, those of `goes` that do go; None: all. share
+        (k,) is that of the largest statistic, rounded so that a tie is a tie on every machine.
     keep : bool, optional
         Whether a candidate without which a readjustment fails is kept from then on.
     rounds : int, optional
@@ -278,10 +280,11 @@ def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=Fa
         statistic = np.where(np.isnan(now), statistic, now)
         off = np.where(used & ~needed & ~np.isnan(now), now, 0.0)
         worst = off.max(initial=0.0)
-        goes = (off > critical) & (off >= (1.0 if few else at_once) * worst)
+        share = np.round(off / worst, TIED) if worst else off
+        goes = (off > critical) & (share >= (1.0 if few else at_once))
         comes = np.zeros(len(now), dtype=bool)
         if goes.any():
-            goes = goes if choose is None else choose(adjustment, goes, off)
+            goes = goes if choose is None else choose(adjustment, goes, share)
         else:
             comes = _coming_back(~used & (now < critical), now, back, returns)
             back[comes] += 1

@@ -3,6 +3,11 @@
 Every number is held against the one in its place. What is allowed between two machines is a part
 of the largest number of the same key (of all rows of a list): 1e-9 in the capacity table, 1e-6
 elsewhere, where a number may be the small difference of large ones (residuals, correlations).
+Two things are compared by what they say. The standard uncertainties of the inputs in each row,
+`capacity.factor_m3`, are one of many square roots F of the covariances F F' of the volumes (axes of
+an ellipsoid have no sign, those of a sphere no place): F F' is compared, of each kind of input by
+itself. And volumes, and what the draws found of them, are alike within 1e-14 of the fullest tank:
+it is how finely a computer can write them down.
 """
 
 import os
@@ -17,6 +22,8 @@ import numpy as np
 from tankcal.record.making import record_of, record_of_adjustment
 
 TABLE, TABLE_TOLERANCE, TOLERANCE = "capacity.", 1e-9, 1e-6
+FACTORS, DRAWN, VOLUMES = "capacity.factor_m3[][]", "monte_carlo.", "_m3"
+ROUNDING, PROBES = 1e-14, 50  # of the largest volume; rows whose covariances with all are compared
 UNCOMPARED = ("format", "tankcal", "versions", "job.source")  # who computed, and where
 WORDS = ("text", "words", "formula")  # of messages: a later version may say it otherwise
 
@@ -171,8 +178,11 @@ def compare_records(record, found):
     _sort(record, "", "", *was)
     _sort(found, "", "", *now)
     largest, beyond, different, count = None, [], 0, 0
+    rounding = ROUNDING * _fullest(record)
     for key, places in was[0].items():
-        worst, changed = _worst(key, places, now[0].get(key, {}))
+        worst, changed = _worst(key, places, now[0].get(key, {}), rounding)
+        if key == FACTORS and worst is not None:
+            worst = _of_factors(record["capacity"], found["capacity"], worst)
         count, different = count + len(places), different + changed
         if worst is None:
             continue
@@ -221,8 +231,44 @@ def _sort(value, key, place, numbers, others):
         others[place] = value
 
 
-def _worst(key, places, found):
-    """(NumberApart of the largest difference or None, how many differ) of one key."""
+def _fullest(record):
+    """Largest volume of a record's table; 0 without one."""
+    table = record.get("capacity") or {}
+    return max(np.abs(np.array(table.get("volume_m3") or [0.0], dtype=float)))
+
+
+def _of_factors(was, now, by_number):
+    """The NumberApart of what the inputs' standard uncertainties say, or None.
+
+    was, now     keys `capacity` of both records
+    by_number    NumberApart of the numbers themselves, for tables of other inputs
+    """
+    if was["inputs"] != now["inputs"]:
+        return by_number
+    F, G = (np.array(one["factor_m3"], dtype=float) for one in (was, now))
+    if F.shape != G.shape:
+        return by_number
+    kinds = np.array([name.rstrip(" 0123456789") for name in was["inputs"]])
+    probes = np.unique(np.linspace(0, len(F) - 1, min(PROBES, len(F))).astype(int))
+    scale, found = float(np.max(np.sum(F**2, axis=1), initial=0.0)), []
+    for kind in dict.fromkeys(kinds):
+        f, g = F[:, kinds == kind], G[:, kinds == kind]
+        one, two = f @ f[probes].T, g @ g[probes].T
+        row, probe = np.unravel_index(np.argmax(np.abs(one - two)), one.shape)
+        apart = float(np.abs(one - two)[row, probe])
+        place = f"capacity.factor_m3[{row}]'[{probes[probe]}] of {kind}"
+        relative = apart / scale if scale else np.inf
+        numbers = float(one[row, probe]), float(two[row, probe])
+        if apart:
+            found.append(NumberApart(place, *numbers, relative, TABLE_TOLERANCE))
+    return max(found, key=_over, default=None)
+
+
+def _worst(key, places, found, rounding):
+    """(NumberApart of the largest difference or None, how many differ) of one key.
+
+    rounding    m3 that are none, of volumes and of what the draws found
+    """
     there = [place for place in places if place in found]
     if not there:
         return None, 0
@@ -231,8 +277,10 @@ def _worst(key, places, found):
     )
     apart = np.abs(one - two)
     changed = int(np.count_nonzero(apart))
-    if not changed:
-        return None, 0
+    if key.startswith(DRAWN) or key.rstrip("[]").endswith(VOLUMES):
+        apart[apart <= rounding] = 0.0
+    if not apart.any():
+        return None, changed
     most, scale = int(np.argmax(apart)), float(np.abs(one).max())
     relative = float(apart[most]) / scale if scale else np.inf
     tolerance = TABLE_TOLERANCE if key.startswith(TABLE) else TOLERANCE

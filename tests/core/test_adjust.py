@@ -7,7 +7,7 @@ import scipy.optimize
 import scipy.sparse
 from jacobians import assert_derivative
 
-from tankcal.adjust import adjust
+from tankcal.adjust import CRITICAL, adjust, snoop
 from tankcal.errors import SolutionError
 from tankcal.geometry.circles import circle_conditions
 
@@ -156,3 +156,22 @@ def test_an_indefinite_covariance_is_refused():
     covariance = np.array([[1.0, 2.0], [2.0, 1.0]])
     with pytest.raises(SolutionError, match="not positive definite"):
         adjust(mean_model, [0.0], np.array([1.0, 2.0]), covariance)
+
+
+@pytest.mark.parametrize("rounding", [1e-13, -1e-13, 0.0])
+def test_readings_that_control_each_other_alone_are_a_tie_on_every_machine(rounding):
+    """Two faces of one sight: |w| is the same but for rounding, and must not decide."""
+    size = np.array([1.0, 18.5 + rounding, 18.5, 1.0])
+
+    def tests(used):
+        return used, np.where(used[1] & used[2], size, 1.0), CRITICAL
+
+    def choose(used, goes, share):
+        assert share[1] == share[2]
+        return goes & (np.arange(4) == np.argmax(share))
+
+    start = np.ones(4, dtype=bool)
+    found = snoop(
+        start, tests, lambda used, goes, comes: used & ~goes, at_once=0.6, returns=0, choose=choose
+    )
+    assert found.adjustment.tolist() == [True, False, True, True]

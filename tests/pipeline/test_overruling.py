@@ -243,6 +243,17 @@ def test_a_reading_that_the_search_sets_aside_is_kept(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("wrong", [7, 189])
+def test_of_two_faces_of_one_sight_the_first_is_set_aside(tmp_path, wrong):
+    """They control each other alone; which is wrong nobody can tell, and the report says so."""
+    alone = run(spoilt_survey(tmp_path / "job", wrong, 0.05))
+    assert reading(alone, "directions", 7).removed
+    assert not reading(alone, "directions", 189).removed
+    (told,) = (one for one in alone.warnings if one.expected.code == "undecided")
+    assert "(row 189)" in str(told)
+
+
+@pytest.mark.slow
 def test_a_reading_left_out_is_only_compared(tmp_path):
     # second method: the same job with use = check in that row
     job = tankcal.load(EXAMPLES / "total-station")

@@ -222,8 +222,11 @@ class _Candidates:
         """The survey with the share (k,) of each."""
         return set_use(survey, {source: share[mine] for source, mine in self.slices.items()})
 
-    def one_of_each_point(self, adjusted, goes, off):
-        """Mask of what goes, at most one of each point: the others may only follow its blunder."""
+    def one_of_each_point(self, adjusted, goes, share):
+        """Mask of what goes, at most one of each point: the others may only follow its blunder.
+
+        Of two that are alike (each other's only control), the one that was read first.
+        """
         survey = adjusted.survey
         n, tied = len(survey.points), []
         for table in _tables(adjusted):
@@ -241,7 +244,7 @@ class _Candidates:
                 owners = np.array(owners)
                 least = np.argmin(counts[owners], axis=0)[None]
                 owner[mine] = np.take_along_axis(owners, least, 0)[0]
-        order = np.lexsort((-np.where(goes, off, 0.0), owner))
+        order = np.lexsort((-np.where(goes, share, 0.0), owner))
         largest = np.zeros(self.count, dtype=bool)
         largest[order[np.append(True, np.diff(owner[order]) > 0)]] = True
         return goes & largest

@@ -14,6 +14,7 @@ import numpy as np
 
 from tankcal.errors import HeightError
 from tankcal.tank.dips.rows import multiples_of
+from tankcal.tank.dips.straightness import first_of_largest
 
 FEWEST_ROWS = 10  # of a zone cut from a stretch: a shorter one is as well read from two rows
 _SAME = 1e-9
@@ -138,7 +139,7 @@ class _Marks:
         deviation = np.zeros(len(number))
         read = self.volume_m3(rows[between]) + (number % self.parts)[between] * mean_m3
         deviation[between] = read - self.volume_m3(marks[between])
-        worst = int(np.argmax(np.abs(deviation))) if len(number) else None
+        worst = first_of_largest(deviation) if len(number) else None
         zone = ProportionalParts(
             bottom_m=bottom_m,
             top_m=top_m,

@@ -21,6 +21,7 @@ METRIC_STEPS_M = (0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
 INCH_STEPS_M = tuple(float(METRES_PER_INCH / part) for part in (1, 2, 4, 8, 16))
 LADDERS_M = {"m": METRIC_STEPS_M, "ft-in-8": INCH_STEPS_M[:4], "ft-in-16": INCH_STEPS_M}
 
+_ALIKE = 1e-4  # of the largest deviation: each is the small difference of two volumes
 _NODES = (1 - np.cos(np.pi * np.arange(9) / 8)) / 2  # of each piece, denser towards its ends
 _GOLDEN = (np.sqrt(5) - 1) / 2
 _SHRINKINGS = 34  # a bracket shrinks to 1e-7 of itself, the deviation is exact to 1e-14 of itself
@@ -49,7 +50,7 @@ class Straightness:
     @property
     def at_m(self):
         """The dip where it is."""
-        return float(self.height_m[np.argmax(np.abs(self.deviation_m3))])
+        return float(self.height_m[first_of_largest(self.deviation_m3)])
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,18 @@ class Rows:
     height_m: np.ndarray
     largest_m3: float
     at_m: float
+
+
+def first_of_largest(deviation_m3):
+    """Place of the first of the largest deviations that differ by no more than rounding.
+
+    So a wall that is alike all the way up tells the same place on every machine.
+
+    >>> first_of_largest(np.array([1.0, -3.0, 3.0000001]))
+    1
+    """
+    size = np.abs(deviation_m3)
+    return int(np.argmax(size >= (1 - _ALIKE) * size.max()))
 
 
 def interpolation_errors(volume_m3, height_m, breakpoints_m=()):
