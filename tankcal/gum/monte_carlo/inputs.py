@@ -33,36 +33,6 @@ def is_normal(distribution):
     return bool(np.allclose(found, expected, rtol=0, atol=1e-9 * distribution.sd))
 
 
-def uniforms(count, inputs, seed):
-    """Scrambled Sobol points: each coordinate uniform, together evenly spread.
-
-    Parameters
-    ----------
-    count, inputs : int
-        Numbers of points and of coordinates; a power of two spreads the points best.
-    seed : int
-        Of the scrambling: the same seed gives the same points.
-
-    Returns
-    -------
-    ndarray, shape (count, inputs)
-        In [0, 1).
-
-    References
-    ----------
-    Owen 1998.
-
-    Examples
-    --------
-    >>> uniforms(4, 2, seed=1).shape
-    (4, 2)
-    """
-    from scipy.stats import qmc  # half a second to import, which is for those who simulate
-
-    points = qmc.Sobol(inputs, scramble=True, rng=np.random.default_rng(seed))
-    return points.random(count)
-
-
 @dataclass(frozen=True)
 class Inputs:
     """Inputs with what their draws need.
@@ -134,8 +104,9 @@ def inputs_of(distributions, correlation=None):
     Examples
     --------
     >>> from tankcal.gum.distributions import Normal
+    >>> from tankcal.gum.monte_carlo.sobol import sobol_points
     >>> pair = inputs_of([Normal(1.0), Normal(2.0)], [[1.0, 0.5], [0.5, 1.0]])
-    >>> values, _ = pair.draws(uniforms(4, 2, seed=1))
+    >>> values, _ = pair.draws(sobol_points(4, 2, seed=1))
     >>> values.shape
     (4, 2)
     """

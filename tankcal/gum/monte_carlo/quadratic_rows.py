@@ -9,9 +9,9 @@ import numpy as np
 from scipy.special import ndtri
 
 from tankcal.gum.monte_carlo.goal import as_good_as_plain, may_stop
-from tankcal.gum.monte_carlo.inputs import uniforms
 from tankcal.gum.monte_carlo.linear import linear_law, shapes_of
 from tankcal.gum.monte_carlo.quadratic import RARE, Lines
+from tankcal.gum.monte_carlo.sobol import sobol_points
 
 SETS = 10  # independent point sets
 POINTS = 2048  # of a set; intervals take FIRST to MOST of them
@@ -59,7 +59,7 @@ def table_estimates(model, ready, goal, progress):
 
 def _point_sets(ready, goal):
     seeds = np.random.SeedSequence(goal.seed).spawn(SETS)
-    return np.stack([ready.draws(uniforms(POINTS, len(ready.mean), seed))[1] for seed in seeds])
+    return np.stack([ready.draws(sobol_points(POINTS, len(ready.mean), seed))[1] for seed in seeds])
 
 
 def _plain(goal, rows, ready, shapes, law):

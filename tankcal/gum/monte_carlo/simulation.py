@@ -14,10 +14,11 @@ from tankcal.gum.monte_carlo.batches import (
     nodes_of,
 )
 from tankcal.gum.monte_carlo.goal import Goal, may_stop, simulation
-from tankcal.gum.monte_carlo.inputs import inputs_of, uniforms
+from tankcal.gum.monte_carlo.inputs import inputs_of
 from tankcal.gum.monte_carlo.linear import linear_law, shapes_of
 from tankcal.gum.monte_carlo.quadratic import QuadraticRows
 from tankcal.gum.monte_carlo.quadratic_rows import table_estimates
+from tankcal.gum.monte_carlo.sobol import sobol_points
 
 DIFFERENCE = 1e-3  # step of the derivatives, in scales of the input
 
@@ -109,7 +110,7 @@ def simulate_in_batches(model, ready, control, goal, progress):
     total = max(FEWEST, -(-goal.plain_draws // size))
     batches = Batches(rows)
     for number, seed in enumerate(np.random.SeedSequence(goal.seed).spawn(total)):
-        x, coordinates = ready.draws(uniforms(size, len(ready.mean), seed))
+        x, coordinates = ready.draws(sobol_points(size, len(ready.mean), seed))
         values = np.asarray(model(x), dtype=float)
         batches.add(*estimates_of(values, coordinates, control, goal.probability))
         progress("Monte Carlo", number + 1, total)

@@ -15,7 +15,8 @@ import numpy as np
 from scipy.special import ndtr
 
 from tankcal.gum.monte_carlo import ESTIMATES, Simulation, numerical_tolerance
-from tankcal.gum.monte_carlo.inputs import inputs_of, uniforms
+from tankcal.gum.monte_carlo.inputs import inputs_of
+from tankcal.gum.monte_carlo.sobol import sobol_points
 
 PROBES = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])  # in u, where the parabola is tried
 TOLERATED = 0.005  # of u of the volume
@@ -66,7 +67,7 @@ def simulate_bent(rest, distributions, added_m3, below, goal):
     ready = inputs_of(distributions, None) if distributions else None
     seeds = np.random.SeedSequence(goal.seed).spawn(SETS)
     sets = [
-        ready.draws(uniforms(COUNT, len(distributions), seed))[0] if ready else np.zeros((1, 0))
+        ready.draws(sobol_points(COUNT, len(distributions), seed))[0] if ready else np.zeros((1, 0))
         for seed in seeds
     ]
     drawn = np.stack([rest(one) - rest.value for one in sets])  # (sets, count, volumes)
