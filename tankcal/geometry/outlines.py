@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy
 
 from tankcal.errors import SolutionError
 from tankcal.geometry.form import (
@@ -19,6 +18,7 @@ from tankcal.geometry.form import (
     unit_form,
     whiten,
 )
+from tankcal.geometry.splines import cardinal_splines, periodic_slopes
 from tankcal.messages import message
 from tankcal.quadrature import panels, polar_products
 
@@ -62,11 +62,12 @@ class Outline:
         """(len(azimuth), p) functions that the parameters multiply, or their derivative."""
         if self.kind == "smoothed":
             return harmonics(azimuth_rad, (len(self.parameters) - 1) // 2, derivative)
-        return self._splines(_into_turn(azimuth_rad, self.knots_rad[0]), derivative)
+        turned = _into_turn(azimuth_rad, self.knots_rad[0])
+        return cardinal_splines(self.knots_rad, FULL_TURN, self._slopes, turned, derivative)
 
     @cached_property
-    def _splines(self):
-        return _cardinal_splines(self.knots_rad)
+    def _slopes(self):
+        return periodic_slopes(self.knots_rad, FULL_TURN)
 
     def radius_m(self, azimuth_rad, derivative=0):
         """(len(azimuth),) radius at each azimuth, or its derivative by the azimuth."""
@@ -302,12 +303,3 @@ def radii_by_coordinates(outline, xy_m):
 
 def _into_turn(azimuth_rad, start):
     return start + (np.asarray(azimuth_rad) - start) % FULL_TURN
-
-
-def _cardinal_splines(knots):
-    """Periodic cubic splines that are one at their own knot and zero at all others."""
-    n = len(knots)
-    values = np.vstack([np.eye(n), np.eye(n)[:1]])
-    return scipy.interpolate.CubicSpline(
-        np.append(knots, knots[0] + FULL_TURN), values, bc_type="periodic"
-    )
