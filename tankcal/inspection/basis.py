@@ -10,7 +10,6 @@ from tankcal.inspection.settlement_limits import Strength
 from tankcal.inspection.shape import Sizes
 from tankcal.job import load
 from tankcal.messages import message
-from tankcal.pipeline.cloud_passes import Reading
 from tankcal.pipeline.surveying import find_survey, placed
 from tankcal.pipeline.wall import Wall, warnings_of
 from tankcal.record.making import JobAsRead
@@ -130,7 +129,7 @@ def _of_job(path, progress, part_progress):
     settings = "job.toml" if path.is_dir() else path.name
     _refuse_others(settings, job.tank.kind)
     try:
-        found = find_survey(job, progress, reading=Reading(None, part_progress))
+        found = find_survey(job, progress, part_progress=part_progress)
     except InputError as error:
         raise InputError(placed(job, error.problems)) from error
     job, wall = found.job, found.survey

@@ -11,28 +11,16 @@ import numpy as np
 from tankcal.errors import HeightError, InputError, Problem
 from tankcal.job import Job
 from tankcal.messages import message
-from tankcal.pipeline.cloud_passes import Reading
-from tankcal.pipeline.cloud_wall import Clouded
 from tankcal.pipeline.corrections import (
     Correction,
     correction_by_liquid,
     corrections_of,
     gross_at_top,
 )
-from tankcal.pipeline.liquid import measure_by_liquid
-from tankcal.pipeline.liquid_checks import check_liquid_result
 from tankcal.pipeline.liquid_geometry import filled_with
-from tankcal.pipeline.liquid_result import LiquidResult
-from tankcal.pipeline.nominal_wall import NominalWall
 from tankcal.pipeline.overruling import Overrulings, effect_of, warn_of_overrulings
-from tankcal.pipeline.radii_wall import RadiiWall
-from tankcal.pipeline.read_wall import ReadWall
-from tankcal.pipeline.ringed_wall import RingedWall
-from tankcal.pipeline.scan import Scan
-from tankcal.pipeline.ship import ShipTables, ship_tables
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
-from tankcal.pipeline.stadia_checks import check_bases
 from tankcal.pipeline.statements import (
     Statements,
     pairs_to_simulate,
@@ -41,18 +29,10 @@ from tankcal.pipeline.statements import (
     statements,
     verdict_of,
 )
-from tankcal.pipeline.strapped_sphere import StrappedSphere
-from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.survey_warnings import incomplete_certificate, open_questions
-from tankcal.pipeline.surveying import adjust_decided, find_survey, placed
+from tankcal.pipeline.surveying import adjust_decided, find_survey, is_surveyed_as, placed
 from tankcal.pipeline.table import check_table, compute_table
 from tankcal.pipeline.tanks import body_of, shell_volume
-from tankcal.pipeline.views import plot
-from tankcal.pipeline.wall import Wall
-from tankcal.pipeline.wall_straps import Straps
-from tankcal.survey import Adjustment
-from tankcal.survey.sighting import Sighting
-from tankcal.survey.tangents import Touching
 from tankcal.tank import dips
 from tankcal.tank.body import Body
 from tankcal.tank.budgets import Budget, budget, reading_sources
@@ -68,6 +48,22 @@ from tankcal.text.display import table_html, volume_text
 if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
+
+    from tankcal.pipeline.cloud_wall import Clouded
+    from tankcal.pipeline.liquid_result import LiquidResult
+    from tankcal.pipeline.nominal_wall import NominalWall
+    from tankcal.pipeline.radii_wall import RadiiWall
+    from tankcal.pipeline.read_wall import ReadWall
+    from tankcal.pipeline.ringed_wall import RingedWall
+    from tankcal.pipeline.scan import Scan
+    from tankcal.pipeline.ship import ShipTables
+    from tankcal.pipeline.strapped_sphere import StrappedSphere
+    from tankcal.pipeline.strapped_wall import StrappedWall
+    from tankcal.pipeline.wall import Wall
+    from tankcal.pipeline.wall_straps import Straps
+    from tankcal.survey import Adjustment
+    from tankcal.survey.sighting import Sighting
+    from tankcal.survey.tangents import Touching
 
 MILLIMETRE, PARTS = 0.001, 10  # of a step of the tables that proportional parts are for
 PARTS_OF_U, PARTS_M3 = 0.05, 0.0005  # error of proportional parts: a share of U, or half a litre
@@ -144,8 +140,8 @@ class Result:
     """
 
     job: Job
-    wall: Wall | None
-    scan: Scan | None
+    wall: "Wall | None"
+    scan: "Scan | None"
     body: Body
     zero_m: float
     table: Capacity
@@ -158,17 +154,17 @@ class Result:
     intervals: Intervals
     rule: RuleVerdict | None
     warnings: tuple[Problem, ...]
-    adjustment: Adjustment | None = None
-    strapped: StrappedWall | None = None
-    sighting: Sighting | None = None
-    touching: Touching | None = None
-    clouded: Clouded | None = None
-    liquid: LiquidResult | None = None
-    nominal: NominalWall | None = None
-    radii: RadiiWall | None = None
-    rings: RingedWall | None = None
-    ship: ShipTables | None = None
-    circles: StrappedSphere | None = None
+    adjustment: "Adjustment | None" = None
+    strapped: "StrappedWall | None" = None
+    sighting: "Sighting | None" = None
+    touching: "Touching | None" = None
+    clouded: "Clouded | None" = None
+    liquid: "LiquidResult | None" = None
+    nominal: "NominalWall | None" = None
+    radii: "RadiiWall | None" = None
+    rings: "RingedWall | None" = None
+    ship: "ShipTables | None" = None
+    circles: "StrappedSphere | None" = None
     overrulings: Overrulings | None = None
 
     def __str__(self) -> str:
@@ -197,6 +193,8 @@ class Result:
 
     def plot(self, what: str | None = None) -> "Figure":
         """A drawing of the result, by the names that `tankcal.plot` takes."""
+        from tankcal.pipeline.views import plot
+
         return plot(self, what)
 
     def budget(
@@ -243,13 +241,13 @@ class Result:
         return None if wall is None else shell_volume(wall)
 
     @property
-    def straps(self) -> Straps | None:
+    def straps(self) -> "Straps | None":
         """Circumferences by tape, and what the wall says of them; None where none were read."""
         wall = self.wall or self.strapped or self.rings
         return None if wall is None else wall.straps
 
     @property
-    def read(self) -> ReadWall | None:
+    def read(self) -> "ReadWall | None":
         """What a tape and reference lines read of a wall, alone or beside points; None: nothing."""
         return self.strapped if self.wall is None else self.wall.read
 
@@ -377,11 +375,10 @@ def run(
     """
     _refuse_other(job, "run")
     with _telling(job):
-        reading = Reading(cluster, part_progress)
-        return _run(job, progress or (lambda text: None), part_progress, simulated, reading)
+        return _run(job, progress or (lambda text: None), part_progress, simulated, cluster)
 
 
-def _run(job, progress, part_progress, simulated, reading):
+def _run(job, progress, part_progress, simulated, cluster):
     if job.tank is None:
         raise InputError(
             Problem(
@@ -389,12 +386,14 @@ def _run(job, progress, part_progress, simulated, reading):
                 message("no_tank", "the job has no tank: only its survey can be adjusted"),
             )
         )
-    given, found = job, find_survey(job, progress, reading=reading)
+    given = job
+    found = find_survey(job, progress, cluster=cluster, part_progress=part_progress)
     job, survey, adjustment = found.job, found.survey, found.adjustment
-    radii = survey if isinstance(survey, RadiiWall) else None
-    measured_wall = survey if radii is None else radii.surveyed
+    surveyed = _by_kind(survey)
     measured = None
     if job.liquid is not None:
+        from tankcal.pipeline.liquid import measure_by_liquid
+
         progress(message("adjusting_liquid", "adjusting the runs by liquid with the geometry"))
         measured = measure_by_liquid(job, survey)
     made = compute_table(job, survey, progress, measured and measured.body)
@@ -414,11 +413,13 @@ def _run(job, progress, part_progress, simulated, reading):
     liquid = measured and measured.result(made.levels_m)
     ship = None
     if job.ship is not None:
+        from tankcal.pipeline.ship import ship_tables
+
         ship = ship_tables(job, survey, body, table, progress=part_progress)
     return Result(
         job=job,
-        wall=measured_wall if isinstance(measured_wall, Wall) else None,
-        scan=survey if isinstance(survey, Scan) else None,
+        wall=surveyed.get("wall"),
+        scan=surveyed.get("scan"),
         body=body,
         zero_m=zero,
         table=table,
@@ -440,31 +441,43 @@ def _run(job, progress, part_progress, simulated, reading):
             overruled,
         ),
         adjustment=adjustment,
-        strapped=measured_wall if isinstance(measured_wall, StrappedWall) else None,
+        strapped=surveyed.get("strapped"),
         sighting=found.sighting,
         touching=found.touching,
         clouded=found.clouded,
         liquid=liquid,
-        nominal=survey if isinstance(survey, NominalWall) else None,
-        radii=radii,
-        rings=survey if isinstance(survey, RingedWall) else None,
+        nominal=surveyed.get("nominal"),
+        radii=surveyed.get("radii"),
+        rings=surveyed.get("rings"),
         ship=ship,
-        circles=survey if isinstance(survey, StrappedSphere) else None,
+        circles=surveyed.get("circles"),
         overrulings=overruled,
     )
 
 
+def _by_kind(survey):
+    """{kind: what was surveyed}; beside declared radii what was measured again of them."""
+    both = (survey, survey.surveyed if is_surveyed_as(survey, "radii") else None)
+    return {one.surveyed_as: one for one in both if one is not None}
+
+
 def _warnings(job, adjustment, sighting, survey, made, liquid, overruled):
-    of_survey = ()
+    of_survey, of_liquid = (), ()
     if adjustment is not None:
+        from tankcal.pipeline.stadia_checks import check_bases
+
         left_open = open_questions(job, adjustment.datum, adjustment.causes)
         of_survey = (*adjustment.warnings, *left_open, *check_bases(job.measurements))
+    if liquid is not None:
+        from tankcal.pipeline.liquid_checks import check_liquid_result
+
+        of_liquid = check_liquid_result(job, liquid)
     warnings = (
         *job.warnings,
         *of_survey,
         *warn_of_overrulings(job, overruled),
         *check_table(job, survey, made, sighting),
-        *check_liquid_result(job, liquid),
+        *of_liquid,
         *incomplete_certificate(job),
     )
     return placed(job, warnings)
@@ -478,7 +491,7 @@ def _telling(job):
         raise InputError(placed(job, error.problems)) from error
 
 
-def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> Adjustment:
+def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> "Adjustment":
     """Adjust the survey of a job, whether it has a tank or not.
 
     Parameters
@@ -519,6 +532,8 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> Adjus
                 ),
             )
         )
+    from tankcal.pipeline.stadia_checks import check_bases
+
     with _telling(job):
         adjustment = adjust_decided(job, progress or (lambda text: None))
     warnings = (*adjustment.warnings, *check_bases(job.measurements))

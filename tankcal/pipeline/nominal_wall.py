@@ -31,6 +31,7 @@ COMMON = 0.8  # share of the variance of a course's radius that all courses have
 class NominalWall(ReadWall):
     """The wall by its drawing, with what a `ReadWall` has; its readings are the nominal radii."""
 
+    surveyed_as = "nominal"
     shell = UprightAxis()
     without_inputs = ("offset",)
     straps = None

@@ -12,7 +12,6 @@ from tankcal.errors import HeightError, InputError, Problem, SolutionError
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.job.model.overrulings import Overruling
 from tankcal.messages import message
-from tankcal.pipeline.liquid import measure_by_liquid
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.tanks import body_of
 
@@ -127,6 +126,8 @@ class _Attempt:
             if job.liquid is None:
                 body = body_of(found.job, found.survey, uncertain=False)
             else:
+                from tankcal.pipeline.liquid import measure_by_liquid
+
                 body = measure_by_liquid(found.job, found.survey).body
             return cls(found, float(body.volume_m3(np.array([level_m]))[0]))
         except (InputError, SolutionError, HeightError):

@@ -69,6 +69,7 @@ class RadiiWall:
     causes: tuple[Factor, ...]
     by_inputs: dict
     updated: Updated | None = None
+    surveyed_as = "radii"
     shell = UprightAxis()
     without_inputs = ("offset", "scale", "tilt")  # of surveyed lengths
     straps = None

@@ -34,6 +34,8 @@ KIND_OF_WAVES = {"oval": "ovality", "seam": "seams"}
 class RingedWall(TapedWall):
     """The rings of a lying tank as strapped; their levels are places along the axis from A."""
 
+    surveyed_as = "rings"
+
     def radius_sd_m(self, factors):
         """(rings,) standard deviation of the mean radii by `RingFeatures.factors`."""
         rings = len(self.joints_m) - 1

@@ -45,6 +45,7 @@ class Scan:
     noise_m: float
     fit: object
     reach_m: tuple[float, float] = (-np.inf, np.inf)
+    surveyed_as = "scan"
 
     def is_within(self, places_m):
         """(n,) whether places lie within the wall, and between the ends of what was surveyed."""

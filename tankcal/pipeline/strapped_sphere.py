@@ -73,6 +73,7 @@ class StrappedSphere:
     prior: FormPrior
     fit: FittedEllipsoid
     tapes: tuple
+    surveyed_as = "circles"
 
     def solid(self, plate_m=0.0, scale=1.0):
         """The `Ellipsoid` inside the plates, its lengths to scale."""

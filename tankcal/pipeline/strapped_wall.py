@@ -123,6 +123,7 @@ class TapedWall(ReadWall):
 class StrappedWall(TapedWall):
     """The wall of an upright tank as strapped."""
 
+    surveyed_as = "strapped"
     shell = UprightAxis()
     without_inputs = ("offset",)  # of points; a tape has one of its own
 

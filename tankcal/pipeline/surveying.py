@@ -5,6 +5,7 @@ The readings may be those of a survey or what one that is only planned foresees.
 
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,25 +13,18 @@ from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.model import Job
 from tankcal.job.tables import in_book
 from tankcal.messages import message
-from tankcal.pipeline.cloud_wall import IN_PROCESS, Clouded, find_wall_in_clouds
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
-from tankcal.pipeline.hit_wall import find_hit_wall
-from tankcal.pipeline.nominal_wall import find_nominal_wall
 from tankcal.pipeline.overruled_points import refuse_kept_readings, with_decided_readings
-from tankcal.pipeline.partial_survey import update_by_survey
-from tankcal.pipeline.radii_wall import RadiiWall, find_radii_wall
-from tankcal.pipeline.ringed_wall import find_ringed_wall
-from tankcal.pipeline.scan import Scan, fit_scan
-from tankcal.pipeline.ship import check_pipe
-from tankcal.pipeline.strapped_sphere import find_strapped_sphere
-from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.survey_warnings import refuse_undetermined
-from tankcal.pipeline.tangent_wall import find_tangent_wall
-from tankcal.pipeline.wall import Wall, find_wall, s_transform
-from tankcal.survey import Adjustment, adjust_survey, wall_points
-from tankcal.survey.sighting import Sighting
-from tankcal.survey.tangents import Touching
-from tankcal.tank.meshes import parse_mesh
+from tankcal.pipeline.wall import find_wall, s_transform
+
+if TYPE_CHECKING:
+    from tankcal.pipeline.cloud_wall import Clouded
+    from tankcal.survey import Adjustment
+    from tankcal.survey.sighting import Sighting
+    from tankcal.survey.tangents import Touching
+
+# Each kind of survey is imported where a job has it: most jobs have one, and all take long to load.
 
 TOLD = 10  # warnings of the adjustment that are told when there is no wall
 
@@ -55,13 +49,18 @@ class Surveyed:
 
     job: Job
     survey: object
-    adjustment: Adjustment | None = None
-    sighting: Sighting | None = None
-    touching: Touching | None = None
-    clouded: Clouded | None = None
+    adjustment: "Adjustment | None" = None
+    sighting: "Sighting | None" = None
+    touching: "Touching | None" = None
+    clouded: "Clouded | None" = None
 
 
-def find_survey(job, progress, amplitudes=None, reading=IN_PROCESS):
+def is_surveyed_as(survey, kind):
+    """Whether what was surveyed of a tank, or None, is of a kind: the name that a Result has."""
+    return survey is not None and survey.surveyed_as == kind
+
+
+def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=None):
     """`Surveyed` of a job: its survey adjusted, its wall found.
 
     Parameters
@@ -72,8 +71,8 @@ def find_survey(job, progress, amplitudes=None, reading=IN_PROCESS):
     amplitudes : Amplitudes, optional
         Of the components of an upright wall where they are known beforehand; None: the readings
         tell them.
-    reading : Reading, optional
-        How files of clouds are read.
+    cluster, part_progress : optional
+        Who reads files of clouds, and who is told: those of `cloud_passes.Reading`.
 
     Raises
     ------
@@ -85,19 +84,29 @@ def find_survey(job, progress, amplitudes=None, reading=IN_PROCESS):
     if job.measurements is not None:
         adjustment = _adjusted(job, progress)
     if not is_sighted and adjustment is not None:
+        from tankcal.survey import wall_points
+
         points = wall_points(adjustment, job.measurements, job.survey.side)
         job = replace(job, points=s_transform(points))
     dof = np.inf if adjustment is None else adjustment.dof
     try:
         if job.hits is not None:
+            from tankcal.pipeline.hit_wall import find_hit_wall
+
             job, sighting, survey = find_hit_wall(
                 job, adjustment, progress, dof, amplitudes=amplitudes
             )
         elif job.tangents is not None:
+            from tankcal.pipeline.tangent_wall import find_tangent_wall
+
             job, touching, survey = find_tangent_wall(
                 job, adjustment, progress, dof, amplitudes=amplitudes
             )
         elif job.clouds is not None:
+            from tankcal.pipeline.cloud_passes import Reading
+            from tankcal.pipeline.cloud_wall import find_wall_in_clouds
+
+            reading = Reading(cluster, part_progress)
             job, clouded, survey = find_wall_in_clouds(
                 job, adjustment, progress, dof, amplitudes=amplitudes, reading=reading
             )
@@ -108,11 +117,13 @@ def find_survey(job, progress, amplitudes=None, reading=IN_PROCESS):
             raise
         told = (one.text for one in placed(job, adjustment.warnings[:TOLD]))
         raise SolutionError(*error.args, *told) from error
-    if adjustment is not None and not is_sighted and isinstance(survey, Wall):
+    if adjustment is not None and not is_sighted and is_surveyed_as(survey, "wall"):
         refuse_other_side(job, partial(is_within_wall, survey), adjustment)
-    elif adjustment is not None and not is_sighted and isinstance(survey, Scan):
+    elif adjustment is not None and not is_sighted and is_surveyed_as(survey, "scan"):
         refuse_other_side(job, survey.is_within, adjustment)
-    if job.radii is not None and not isinstance(survey, RadiiWall):
+    if job.radii is not None and not is_surveyed_as(survey, "radii"):
+        from tankcal.pipeline.partial_survey import update_by_survey
+
         progress(message("updating_radii", "bringing the former radii up to date"))
         survey = update_by_survey(job, survey)
     return Surveyed(job, survey, adjustment, sighting, touching, clouded)
@@ -149,6 +160,8 @@ def adjust_decided(job, progress):
     SolutionError
         As `adjust_survey`.
     """
+    from tankcal.survey import adjust_survey
+
     measurements = with_decided_readings(job.measurements, job.overrulings)
     adjustment = adjust_survey(measurements, progress)
     refuse_kept_readings(job, adjustment)
@@ -158,23 +171,38 @@ def adjust_decided(job, progress):
 def _survey(job, progress, dof, amplitudes):
     """What was surveyed: a wall of courses, a mesh, the scan of another wall; None: sizes alone."""
     if job.rings:
+        from tankcal.pipeline.ringed_wall import find_ringed_wall
+
         return find_ringed_wall(job, progress, amplitudes)
     if job.strapping is not None and job.points is None:
+        from tankcal.pipeline.strapped_wall import find_strapped_wall
+
         return find_strapped_wall(job, progress, amplitudes)
     if job.radii is not None and job.points is None:
+        from tankcal.pipeline.radii_wall import find_radii_wall
+
         return find_radii_wall(job, progress)
     if job.tank.kind == "vertical" and job.points is None and job.liquid is not None:
+        from tankcal.pipeline.nominal_wall import find_nominal_wall
+
         return find_nominal_wall(job, progress)
     if job.tank.kind == "vertical":
         return find_wall(job, progress, dof, amplitudes)
     if job.great_circles is not None:
+        from tankcal.pipeline.strapped_sphere import find_strapped_sphere
+
         return find_strapped_sphere(job, progress)
     if job.mesh is not None:
+        from tankcal.pipeline.ship import check_pipe
+        from tankcal.tank.meshes import parse_mesh
+
         progress(message("checking_mesh", "checking the mesh {file}", file=job.mesh.file))
         mesh = parse_mesh(job.mesh.file, job.mesh.data, job.mesh.unit_m)
         check_pipe(job, mesh)
         return mesh
     if job.points is not None:
+        from tankcal.pipeline.scan import fit_scan
+
         progress(
             message(
                 "fitting_wall", "fitting the wall to {count} points", count=len(job.points.names)

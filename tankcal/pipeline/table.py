@@ -9,26 +9,11 @@ import numpy as np
 
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.messages import message
-from tankcal.pipeline.cloud_checks import check_clouds
-from tankcal.pipeline.cloud_wall import Clouded
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
-from tankcal.pipeline.great_circle_checks import check_circles
-from tankcal.pipeline.hit_checks import check_hits
-from tankcal.pipeline.line_checks import check_leans, check_lines
-from tankcal.pipeline.radii_wall import RadiiWall
-from tankcal.pipeline.ring_checks import check_rings
-from tankcal.pipeline.ringed_wall import RingedWall
-from tankcal.pipeline.scan import Scan
-from tankcal.pipeline.ship import undeclared_of_ship
-from tankcal.pipeline.strapped_sphere import StrappedSphere
-from tankcal.pipeline.strapped_wall import StrappedWall
-from tankcal.pipeline.strapping_checks import check_strapped, check_straps_beside_points
 from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
-from tankcal.pipeline.tangent_checks import check_tangents
+from tankcal.pipeline.surveying import is_surveyed_as
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
-from tankcal.pipeline.wall import Wall, warnings_of
 from tankcal.solver.threads import threads_for
-from tankcal.survey.tangents import Touching
 from tankcal.tank.body import Body
 from tankcal.tank.capacity import Capacity
 from tankcal.tank.dips import (
@@ -152,7 +137,7 @@ def check_table(job, survey, made, sighting=None):
     -------
     tuple of Problem
     """
-    if isinstance(survey, RadiiWall):
+    if is_surveyed_as(survey, "radii"):
         survey = survey.surveyed
     return (
         *_doubts_of_survey(job, survey, made.top_m),
@@ -164,39 +149,78 @@ def check_table(job, survey, made, sighting=None):
 
 def _undeclared(job, survey, body):
     """Inputs without u, those of the table first, then what moves only corrections of a ship."""
-    return tuple(dict.fromkeys((*body.undeclared(), *undeclared_of_ship(job, survey))))
+    of_ship = ()
+    if job.ship is not None:
+        from tankcal.pipeline.ship import undeclared_of_ship
+
+        of_ship = undeclared_of_ship(job, survey)
+    return tuple(dict.fromkeys((*body.undeclared(), *of_ship)))
 
 
 def _doubts_of_sights(job, survey, sighting):
     if sighting is None:
         return ()
-    if isinstance(sighting, Clouded):
-        return check_clouds(job, survey, sighting)
-    if isinstance(sighting, Touching):
+    if job.hits is not None:
+        from tankcal.pipeline.hit_checks import check_hits
+
+        return check_hits(job, survey, sighting)
+    if job.tangents is not None:
+        from tankcal.pipeline.tangent_checks import check_tangents
+
         return check_tangents(job, survey, sighting)
-    return check_hits(job, survey, sighting)
+    from tankcal.pipeline.cloud_checks import check_clouds
+
+    return check_clouds(job, survey, sighting)
 
 
 def _doubts_of_survey(job, survey, top_m):
-    if isinstance(survey, Wall):
-        straps = survey.straps
-        beside = () if straps is None else check_straps_beside_points(job, straps)
-        return (
-            *warnings_of(job, survey),
-            *check_wall(job, survey),
-            *beside,
-            *check_lines(job, survey.read),
-            *check_leans(job, survey),
-        )
-    if isinstance(survey, StrappedWall):
-        return (*check_strapped(job, survey), *check_lines(job, survey))
-    if isinstance(survey, StrappedSphere):
+    kind = None if survey is None else survey.surveyed_as
+    if kind == "wall":
+        return _doubts_of_wall(job, survey)
+    if kind == "strapped":
+        from tankcal.pipeline.strapping_checks import check_strapped
+
+        return (*check_strapped(job, survey), *_doubts_of_lines(job, survey))
+    if kind == "circles":
+        from tankcal.pipeline.great_circle_checks import check_circles
+
         return check_circles(job, survey)
-    if isinstance(survey, Scan):
-        return check_scan(job, survey, top_m)
-    if isinstance(survey, RingedWall):
+    if kind == "rings":
+        from tankcal.pipeline.ring_checks import check_rings
+
         return check_rings(job, survey)
-    return () if survey is None else check_mesh(job, top_m)
+    if kind == "scan":
+        return check_scan(job, survey, top_m)
+    return check_mesh(job, top_m) if kind == "mesh" else ()
+
+
+def _doubts_of_wall(job, wall):
+    from tankcal.pipeline.wall import warnings_of
+
+    beside = leans = ()
+    if wall.straps is not None:
+        from tankcal.pipeline.strapping_checks import check_straps_beside_points
+
+        beside = check_straps_beside_points(job, wall.straps)
+    if job.lines is not None:
+        from tankcal.pipeline.line_checks import check_leans
+
+        leans = check_leans(job, wall)
+    return (
+        *warnings_of(job, wall),
+        *check_wall(job, wall),
+        *beside,
+        *_doubts_of_lines(job, wall.read),
+        *leans,
+    )
+
+
+def _doubts_of_lines(job, wall):
+    if job.lines is None:
+        return ()
+    from tankcal.pipeline.line_checks import check_lines
+
+    return check_lines(job, wall)
 
 
 def _without_rounding(volumes, areas, sources):

@@ -103,6 +103,7 @@ class Wall:
     by_inputs: dict = field(default_factory=dict)
     without_inputs: tuple = ()
     origins_m: np.ndarray | None = None
+    surveyed_as = "wall"
 
     def lowest_outline(self, azimuth_rad):
         """(x, y) of the axis at the bottom, and (n,) radii of the lowest section, m."""

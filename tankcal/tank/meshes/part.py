@@ -41,6 +41,7 @@ class Mesh:
     faces: np.ndarray
     bodies: int
     notes: tuple[str, ...]
+    surveyed_as = "mesh"
 
 
 @dataclass(frozen=True)
