@@ -6,7 +6,7 @@ import numpy as np
 
 from tankcal.job import Switches
 from tankcal.messages import Message, message
-from tankcal.pipeline.tanks import as_declared, body_of, pressure_of, thermal_scale
+from tankcal.pipeline.tanks import as_declared, body_of, thermal_scale
 from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 
 # Named by title and edition alone: the bodies of paid standards were not read, so no clause is.
@@ -166,6 +166,8 @@ def _of_shell(job, wall):
 
 
 def _of_pressure(job):
+    from tankcal.pipeline.tanks.solid import pressure_of
+
     load = pressure_of(job)
     formula = message(
         "pressure_of_sphere",

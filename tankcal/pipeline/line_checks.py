@@ -8,7 +8,6 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.line_departures import check_lines_apart, check_scale, check_sign
-from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.survey.reference_line import (
     ARCSEC,
@@ -62,7 +61,7 @@ def check_lines(job, wall):
         *_off_axis(job, levels, lean),
         *_of_scope(job, lean),
         *_of_plummets(job),
-        *(_of_straps(job, wall, levels) if isinstance(wall, StrappedWall) else ()),
+        *(_of_straps(job, wall, levels) if wall.surveyed_as == "strapped" else ()),
     )
 
 

@@ -13,7 +13,7 @@ from tankcal.pipeline.liquid_geometry import Geometry, wide_input
 from tankcal.pipeline.nominal_wall import NominalWall, find_nominal_wall
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.survey_limits import limits_of
-from tankcal.pipeline.tanks import sized_job
+from tankcal.pipeline.tanks.solid import sized_job
 
 KEPT = (  # inputs that say nothing of the wall, but of what it holds and how it gives way
     *("plate_thickness", "shell_temperature", "expansion", "youngs_modulus"),

@@ -7,7 +7,8 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.pipeline.tanks import heeled_body, ship_pipe
+from tankcal.pipeline.tanks import heeled_body
+from tankcal.pipeline.tanks.solid import ship_pipe
 from tankcal.tank.meshes import holds
 from tankcal.tank.ships import corrections_of, in_ship_frame
 from tankcal.tank.ships.corrections import FULL

@@ -3,12 +3,9 @@
 import numpy as np
 from scipy.special import fdtri, gammaincinv
 
-from tankcal.calibration.edges import Frame, own_shift
-from tankcal.calibration.interiors import interiors_of
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.geometry.rotations import angle_derivatives, angles_of
 from tankcal.record.schema import Saved, filled_from, key
-from tankcal.survey.network import correlations
 from tankcal.survey.network.quality import ellipsoid_factor, ellipsoids, precision
 
 ELLIPSE = 0.95  # probability of the ellipses and ellipsoids that are drawn and listed
@@ -252,10 +249,14 @@ def _fit_of_photos(adjustment):
 
 def cameras_of(adjustment, measurements=None):
     """The `AdjustedCamera` of each set of interior parameters."""
+    from tankcal.calibration.interiors import interiors_of
+
     return [_camera(one) for one in interiors_of(adjustment, measurements)]
 
 
 def _camera(interior):
+    from tankcal.survey.network import correlations
+
     values = dict(zip(PARAMETERS, interior.values.tolist(), strict=True))
     sds = dict(
         zip(interior.free, np.sqrt(np.maximum(np.diag(interior.covariance), 0.0)), strict=True)
@@ -282,6 +283,8 @@ def _camera(interior):
 
 def _edge_effect(name, values, form, corner_mm):
     """Largest shift (um) that a parameter makes in a corner of the image; None for c."""
+    from tankcal.calibration.edges import Frame, own_shift
+
     q = np.array([values[one] for one in PARAMETERS])
     shift = own_shift(name, q, form, Frame(np.asarray(corner_mm, dtype=float)))
     return None if shift is None else shift.corner_um

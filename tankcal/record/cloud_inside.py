@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from tankcal.pipeline.cloud_bottom import deadwood_rows
 from tankcal.record.schema import Saved, key
 
 
@@ -59,6 +58,8 @@ def inside_of(result, zero_m):
 
 
 def _things(inside, confirmed, zero_m):
+    from tankcal.pipeline.cloud_bottom import deadwood_rows
+
     found = []
     pairs = zip(inside.proposals, deadwood_rows(inside, zero_m), strict=True)
     for one, (name, low, high, volume, u) in pairs:

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.pipeline.cloud_checks import overlaps_of
 from tankcal.record.cloud_inside import InsideSeen, inside_of
 from tankcal.record.cloud_map import CloudMap, map_of
 from tankcal.record.hits import SharedByHits, shared_of
@@ -164,6 +163,8 @@ def clouds_of(result):
     clouded, clouds = result.clouded, result.job.clouds
     if clouded is None:
         return None
+    from tankcal.pipeline.cloud_checks import overlaps_of
+
     certificates = {name: tool.certificate for name, tool in clouds.ranging.items()}
     return CloudsRecord(
         files=_files(clouds, clouded),

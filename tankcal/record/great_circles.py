@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from tankcal.geometry.great_ellipses import horizontal_axes
 from tankcal.record.schema import Saved, key
 from tankcal.record.strapping import TapeUsed, tapes_of
 
@@ -48,6 +47,8 @@ def great_circles_of(result):
     sphere = result.circles
     if sphere is None:
         return None
+    from tankcal.geometry.great_ellipses import horizontal_axes
+
     a, b, azimuth = horizontal_axes(sphere.fit.unknowns)
     return GreatCirclesRecord(
         readings=_readings(sphere),

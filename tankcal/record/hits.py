@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from tankcal.pipeline.hit_checks import least_hits
 from tankcal.record.schema import Saved, key
 from tankcal.survey.control_drift import HOUR_S, drifts_of, repeats_of
 
@@ -182,6 +181,8 @@ def shared_of(told, certificates, told_m):
 
 
 def _rings(result):
+    from tankcal.pipeline.hit_checks import least_hits
+
     job, wall = result.job, result.wall
     least, count = least_hits(job), np.count_nonzero(~job.hits.check)
     heights = np.array([section.group.height_m for section in wall.sections])

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from tankcal.pipeline.radii_update import LARGEST_W
 from tankcal.record.schema import Saved, key
 
 
@@ -47,6 +46,8 @@ def radii_of(result):
     if wall is None:
         return None
     if wall.updated is not None:
+        from tankcal.pipeline.radii_update import LARGEST_W
+
         declared = result.job.change
         change = ChangeOfRadii(declared.common_m, declared.own_m, declared.shared_m, LARGEST_W)
     return RadiiRecord(

@@ -2,9 +2,6 @@
 
 import numpy as np
 
-from tankcal.geometry.support import fit_support
-from tankcal.pipeline.moved_setups import critical_of_setup
-from tankcal.pipeline.tangent_checks import judge_tangents, least_tangents
 from tankcal.record.hits import departure_from_sections
 from tankcal.record.schema import Saved, key
 
@@ -78,6 +75,8 @@ def tangents_of(result):
     """`TangentsRecord` of a result; None where the limbs were not sighted."""
     if result.touching is None:
         return None
+    from tankcal.pipeline.tangent_checks import judge_tangents
+
     tests = judge_tangents(result.job, result.wall, result.touching)
     mean, common, own = result.touching.excess
     return TangentsRecord(
@@ -91,6 +90,8 @@ def tangents_of(result):
 
 
 def _setups(result, tests):
+    from tankcal.pipeline.moved_setups import critical_of_setup
+
     tangents, poses = result.job.tangents, result.touching.poses
     setup, found, first = np.array(tangents.setup), [], {}
     for place, (name, _) in enumerate(poses.keys):
@@ -141,6 +142,8 @@ def _readings(result, tests):
 
 
 def _levels(result, tests):
+    from tankcal.pipeline.tangent_checks import least_tangents
+
     job, least = result.job, least_tangents(result.job)
     counted = np.flatnonzero(~job.tangents.check)
     name_of = np.array(result.touching.points.section)
@@ -171,6 +174,8 @@ def _levels(result, tests):
 
 def _curve(touching, mine):
     """Highest wave, and `SupportCurve` of some tangents; None: they do not determine it."""
+    from tankcal.geometry.support import fit_support
+
     order = int(np.clip(len(mine) // PER_WAVE - 1, 1, MOST_WAVES))
     f, support = touching.normal_rad[mine], touching.support_m[mine]
     for highest in range(order, 0, -1):

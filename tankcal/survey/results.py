@@ -2,14 +2,17 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tankcal.messages import Message
-from tankcal.survey.measurements import RejectedReadings
-from tankcal.survey.network import Adjusted
 from tankcal.text.digits import fixed
 from tankcal.text.display import table_html
+
+if TYPE_CHECKING:
+    from tankcal.survey.measurements import RejectedReadings
+    from tankcal.survey.network import Adjusted
 
 _SHOWN = 20  # points that an adjustment shows of itself
 
@@ -232,7 +235,7 @@ class RepeatedReadings:
     mean_mm: np.ndarray
     sd_mm: np.ndarray
     limit_mm: float | None
-    rejected: tuple[RejectedReadings, ...]
+    rejected: tuple["RejectedReadings", ...]
 
     @property
     def mean_sd_mm(self):
@@ -296,7 +299,7 @@ class Adjustment:
         None: not asked for.
     """
 
-    adjusted: Adjusted
+    adjusted: "Adjusted"
     there: np.ndarray
     aside: tuple
     readings: tuple[Reading, ...]

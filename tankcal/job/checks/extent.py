@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.clouds.inside.floor_cells import reach_of_floor
 from tankcal.job.checking import has_rows, zero_z
 from tankcal.job.contract.bottom import OF_CLOUD, rise_of_bottom
 from tankcal.job.contract.observations import READINGS
@@ -147,6 +146,8 @@ def _of_vertical(values, bottom):
         lowest += [z - zero for z in bottom.of("z_m") if z is not None]
         lowest += [level for level in bottom.of("level_m") if level is not None]
     if values["bottom"]["form"] == OF_CLOUD and diameter is not None:
+        from tankcal.clouds.inside.floor_cells import reach_of_floor
+
         lowest.append(shell_z - zero - reach_of_floor(diameter / 2))  # how deep it is looked for
     over = depth_of_top(values)
     top = None if None in (height, over) else shell_z + height + over - zero

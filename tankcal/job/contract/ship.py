@@ -9,7 +9,6 @@ from tankcal.job.checking import has_rows, is_not_given, missing_beside, tell
 from tankcal.job.contract.shorthand import number, positive
 from tankcal.job.fields import Field
 from tankcal.messages import message
-from tankcal.tank.ships import Pipe, in_ship_frame
 
 MESH_ONLY = ("mesh",)
 BOW_DEG = 90.0  # the bow is towards +x where nothing else is said
@@ -158,6 +157,8 @@ def _check_pipe(ship, refuse):
 
 def _check_rise(ship, refuse):
     """Rising enough at all pairs; a pipe that does not at even keel is told alone."""
+    from tankcal.tank.ships import Pipe, in_ship_frame
+
     bow = BOW_DEG if ship["bow_azimuth_deg"] is None else ship["bow_azimuth_deg"]
     ends = in_ship_frame([ship["pipe_bottom_m"], ship["pipe_top_m"]], radians(bow))
     pipe = Pipe(*np.asarray(ends))

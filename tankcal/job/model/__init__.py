@@ -1,8 +1,8 @@
 """The checked job as frozen dataclasses, all in SI."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from tankcal.job.model.clouds import Clouds
 from tankcal.job.model.liquid import Meter, Metering
 from tankcal.job.model.overrulings import Overruling
 from tankcal.job.model.parts import (
@@ -30,14 +30,17 @@ from tankcal.job.model.settings import (
     TableSpec,
     Tank,
 )
-from tankcal.survey.great_circles import GreatCircles
-from tankcal.survey.measurements import Measurements
 from tankcal.survey.points import Points
-from tankcal.survey.reference_line import ReferenceLines
-from tankcal.survey.strapping import Strapping
-from tankcal.survey.tangents import Tangents
-from tankcal.survey.wall_hits import WallHits
 from tankcal.tank.rules.model import Rule
+
+if TYPE_CHECKING:
+    from tankcal.job.model.clouds import Clouds
+    from tankcal.survey.great_circles import GreatCircles
+    from tankcal.survey.measurements import Measurements
+    from tankcal.survey.reference_line import ReferenceLines
+    from tankcal.survey.strapping import Strapping
+    from tankcal.survey.tangents import Tangents
+    from tankcal.survey.wall_hits import WallHits
 
 __all__ = [
     "Bottom",
@@ -170,22 +173,22 @@ class Job:
     sphere: Sphere | None = None
     mesh: Mesh | None = None
     ship: Ship | None = None
-    measurements: Measurements | None = None
+    measurements: "Measurements | None" = None
     correlations: tuple[tuple[str, str, float], ...] = ()
     stated: tuple[StatedVolume, ...] = ()
     rule: Rule | None = None
     circumference_m: float | None = None
     diameter_is: str | None = None
     inspection: Inspection | None = None
-    strapping: Strapping | None = None
-    lines: ReferenceLines | None = None
-    hits: WallHits | None = None
-    tangents: Tangents | None = None
-    clouds: Clouds | None = None
+    strapping: "Strapping | None" = None
+    lines: "ReferenceLines | None" = None
+    hits: "WallHits | None" = None
+    tangents: "Tangents | None" = None
+    clouds: "Clouds | None" = None
     liquid: Metering | None = None
     radii: Radii | None = None
     change: Change | None = None
     rings: tuple[Ring, ...] = ()
-    great_circles: GreatCircles | None = None
+    great_circles: "GreatCircles | None" = None
     top: Top | None = None
     overrulings: tuple[Overruling, ...] = ()

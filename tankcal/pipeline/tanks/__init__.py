@@ -1,13 +1,6 @@
 """From a checked job to the body of its tank: every part, with the corrections that are on."""
 
 from tankcal.pipeline.tanks.common import as_declared, thermal_scale
-from tankcal.pipeline.tanks.solid import (
-    pressure_of,
-    ship_pipe,
-    sized_job,
-    solid_body,
-    solid_zero,
-)
 from tankcal.pipeline.tanks.vertical import (
     critical_zone,
     insets_of,
@@ -22,10 +15,7 @@ __all__ = [
     "critical_zone",
     "heeled_body",
     "insets_of",
-    "pressure_of",
     "shell_volume",
-    "ship_pipe",
-    "sized_job",
     "thermal_scale",
     "zero_height",
 ]
@@ -42,14 +32,22 @@ def body_of(job, survey, switches=None, uncertain=True):
     switches = job.switches if switches is None else switches
     if job.tank.kind == "vertical":
         return vertical_body(job, survey, switches, uncertain)
+    from tankcal.pipeline.tanks.solid import solid_body
+
     return solid_body(job, survey, switches)
 
 
 def heeled_body(job, survey, trim, list_):
     """The tank of a ship at tangents of trim and list; levels are soundings along its pipe."""
+    from tankcal.pipeline.tanks.solid import solid_body
+
     return solid_body(job, survey, job.switches, (trim, list_))
 
 
 def zero_height(job, survey):
     """Level of the table's zero (dip 0) in the frame of the parts, m."""
-    return shell_zero(job, survey) if job.tank.kind == "vertical" else solid_zero(job)
+    if job.tank.kind == "vertical":
+        return shell_zero(job, survey)
+    from tankcal.pipeline.tanks.solid import solid_zero
+
+    return solid_zero(job)

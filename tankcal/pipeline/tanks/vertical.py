@@ -17,13 +17,11 @@ from tankcal.pipeline.tanks.common import (
     told_by,
 )
 from tankcal.tank.body import Body, ShellPart
-from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
 from tankcal.tank.courses import DEPARTURES, CourseShape
 from tankcal.tank.factors import Factor, cause_factors
 from tankcal.tank.fittings import floating_roof
 from tankcal.tank.heads import End, standard_end
 from tankcal.tank.hydrostatics import liquid_head
-from tankcal.tank.liquid_zone import Above, measured_bottom
 from tankcal.tank.parts import Part
 from tankcal.tank.terrain import Footprint
 from tankcal.tank.tips import FORMS as TIPS
@@ -193,12 +191,16 @@ def _on_its_bottom(job, wall, shell, zero, parts):
     """The parts with the bottom: beside them, or below them where it was measured by liquid."""
     bottom = job.bottom
     if bottom.form == "liquid":
+        from tankcal.tank.liquid_zone import Above, measured_bottom
+
         measured = measured_bottom(bottom.level_m + zero, bottom.volume_m3, bottom.u_m3)
         return [*(Above(part, measured.highest_m) for part in parts), measured]
     return [*parts, widen_bottom(_bottom(job, wall, shell), shell)]
 
 
 def _bottom(job, wall, shell):
+    from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
+
     bottom, low = job.bottom, job.datum.bottom_z_m
     footprint = _footprint(wall, shell)
     if bottom.form == "leaning":

@@ -6,16 +6,6 @@ in excess) is told after it.
 
 from tankcal.job.checking import has_rows, tell
 from tankcal.job.checks.extent import has_survey, is_sighted
-from tankcal.job.checks.survey.cameras import check_cameras
-from tankcal.job.checks.survey.datum import check_datum, check_held, check_known
-from tankcal.job.checks.survey.doubtful import check_doubtful
-from tankcal.job.checks.survey.files import SurveyFiles
-from tankcal.job.checks.survey.focus import check_depth_of_field
-from tankcal.job.checks.survey.images import check_images
-from tankcal.job.checks.survey.instruments import check_instruments
-from tankcal.job.checks.survey.names import check_names
-from tankcal.job.checks.survey.readings import check_correlated, check_readings
-from tankcal.job.checks.survey.stadia import check_stadia
 from tankcal.job.contract import KEYS
 from tankcal.job.tables import SURVEY_TABLES
 from tankcal.messages import message
@@ -40,19 +30,9 @@ def check_survey(values, tables, registers, raw, is_whole, log):
         )
         log.problem(tables["points"].file, expected)
     told = frozenset((problem.file, problem.row) for problem in log.problems)
-    files = SurveyFiles(values, tables, registers, raw, log, told)
-    check_cameras(files)
-    check_depth_of_field(files)
-    check_instruments(files)
-    check_images(files)
-    check_readings(files)
-    check_stadia(files)
-    check_known(files)
-    check_names(files)
-    check_held(files)
-    check_correlated(files)
-    check_datum(files)
-    check_doubtful(files)
+    from tankcal.job.checks.survey.whole import check_files
+
+    check_files(values, tables, registers, raw, log, told)
 
 
 def _tell_nothing_to_adjust(values, tables, raw, is_whole, log):

@@ -1,0 +1,32 @@
+"""All checks of the files of a survey, in the order in which their problems are told."""
+
+from tankcal.job.checks.survey.cameras import check_cameras
+from tankcal.job.checks.survey.datum import check_datum, check_held, check_known
+from tankcal.job.checks.survey.doubtful import check_doubtful
+from tankcal.job.checks.survey.files import SurveyFiles
+from tankcal.job.checks.survey.focus import check_depth_of_field
+from tankcal.job.checks.survey.images import check_images
+from tankcal.job.checks.survey.instruments import check_instruments
+from tankcal.job.checks.survey.names import check_names
+from tankcal.job.checks.survey.readings import check_correlated, check_readings
+from tankcal.job.checks.survey.stadia import check_stadia
+
+
+def check_files(values, tables, registers, raw, log, told):
+    """Check what a survey consists of.
+
+    told  (file, row) of each problem that was told before
+    """
+    files = SurveyFiles(values, tables, registers, raw, log, told)
+    check_cameras(files)
+    check_depth_of_field(files)
+    check_instruments(files)
+    check_images(files)
+    check_readings(files)
+    check_stadia(files)
+    check_known(files)
+    check_names(files)
+    check_held(files)
+    check_correlated(files)
+    check_datum(files)
+    check_doubtful(files)
