@@ -3,10 +3,7 @@
 import json
 from pathlib import Path
 
-from tankcal.job.excel import MAX_FILE_BYTES, Unreadable, read_sheets
 from tankcal.job.folder import MAX_SETTINGS_BYTES, parsed_toml
-from tankcal.job.grids import table_rows
-from tankcal.job.sheets import KEY, SECTION, VALUE
 from tankcal.job.tables import SETTINGS_FILE, SETTINGS_SHEET, Log, read_bytes
 from tankcal.text.languages import DEFAULT, LANGUAGES, nearest_language
 from tankcal.text.words import load_words
@@ -23,7 +20,7 @@ def asked_language(path):
             given = _in_workbook(path, log)
         else:
             given = _in_settings(path / SETTINGS_FILE if path.is_dir() else path, log)
-    except (OSError, ValueError, Unreadable):
+    except (OSError, ValueError):
         return None
     return nearest_language(given)
 
@@ -59,10 +56,18 @@ def _in_settings(path, log):
 
 
 def _in_workbook(path, log):
+    from tankcal.job.excel import MAX_FILE_BYTES, Unreadable, read_sheets
+    from tankcal.job.grids import table_rows
+    from tankcal.job.sheets import KEY, SECTION, VALUE
+
     data = read_bytes(path, log, MAX_FILE_BYTES)
     if data is None:
         return None
-    for sheet in read_sheets(data, lambda title: title.strip().lower() == SETTINGS_SHEET):
+    try:
+        sheets = read_sheets(data, lambda title: title.strip().lower() == SETTINGS_SHEET)
+    except Unreadable:
+        return None
+    for sheet in sheets:
         rows, _ = table_rows(sheet.title, sheet.grid, log)
         headings = rows[0][1] if rows else []
         if {SECTION, KEY, VALUE} <= {one for one in headings if isinstance(one, str)}:

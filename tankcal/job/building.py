@@ -6,8 +6,18 @@ from tankcal.errors import SHEET
 from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
 from tankcal.job.checking import has_rows
 from tankcal.job.checks import check_all
-from tankcal.job.checks.extent import has_radii, has_survey, is_metered, is_sighted, is_strapped
-from tankcal.job.clouds import make_clouds
+from tankcal.job.checks.extent import (
+    has_clouds,
+    has_great_circles,
+    has_hits,
+    has_radii,
+    has_survey,
+    has_tangents,
+    is_metered,
+    is_sighted,
+    is_strapped,
+)
+from tankcal.job.checks.lines import has_lines
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.contract.clouds import KINDS as OF_CLOUDS
 from tankcal.job.contract.great_circles import BESIDE as BESIDE_CIRCLES
@@ -15,15 +25,8 @@ from tankcal.job.contract.strapping import COLUMNS as OF_TAPES
 from tankcal.job.contract.strapping import IN_PLACE
 from tankcal.job.covariance import OF_RADII, read_covariance
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
-from tankcal.job.great_circles import make_great_circles
-from tankcal.job.hits import make_hits
-from tankcal.job.lines import make_lines
-from tankcal.job.liquid import make_metering
-from tankcal.job.measuring import make_measurements
 from tankcal.job.overrulings import make_overrulings
-from tankcal.job.radii import make_radii
 from tankcal.job.rule_files import find_rule
-from tankcal.job.strapping import make_strapping
 from tankcal.job.tables import (
     CLOUD_TABLES,
     COVARIANCE_FILE,
@@ -41,7 +44,6 @@ from tankcal.job.tables import (
     TANK_TABLES,
     missing_sheet,
 )
-from tankcal.job.tangents import make_tangents
 from tankcal.messages import message
 
 
@@ -58,31 +60,58 @@ def job_of(raw, log, is_whole=True):
     log.stop_if_problems()
     measurements = None
     if has_survey(tables):
+        from tankcal.job.measuring import make_measurements
+
         measurements = make_measurements(values, tables, registers)
     overrulings = make_overrulings(tables["overrulings"])
     if not is_whole:
         frame = make_frame(raw, values, tables, measurements, tuple(log.warnings))
         return replace(frame, overrulings=overrulings)
-    strapping = make_strapping(values, tables, registers)
     made = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
-    lines, hits = make_lines(tables, registers), make_hits(tables, registers)
-    tangents = make_tangents(tables, registers)
-    clouds = make_clouds(values, tables, registers, raw)
-    liquid = make_metering(values, tables, registers, raw)
-    radii, change = make_radii(values, tables, attached.radii_covariance_m2)
-    return replace(
-        made,
-        strapping=strapping,
-        lines=lines,
-        hits=hits,
-        tangents=tangents,
-        clouds=clouds,
-        liquid=liquid,
-        radii=radii,
-        change=change,
-        great_circles=make_great_circles(tables, registers),
-        overrulings=overrulings,
-    )
+    found = _make_surveys(raw, values, tables, registers, attached)
+    return replace(made, overrulings=overrulings, **found)
+
+
+def _make_surveys(raw, values, tables, registers, attached):
+    """{part of a Job: what was measured} other than points, of the tables that it has.
+
+    Each kind is imported where a job has it: most jobs have one, and all take long to load.
+    """
+    found = {}
+    if is_strapped(tables):
+        from tankcal.job.strapping import make_strapping
+
+        found["strapping"] = make_strapping(values, tables, registers)
+    if has_lines(tables):
+        from tankcal.job.lines import make_lines
+
+        found["lines"] = make_lines(tables, registers)
+    if has_hits(tables):
+        from tankcal.job.hits import make_hits
+
+        found["hits"] = make_hits(tables, registers)
+    if has_tangents(tables):
+        from tankcal.job.tangents import make_tangents
+
+        found["tangents"] = make_tangents(tables, registers)
+    if has_clouds(tables):
+        from tankcal.job.clouds import make_clouds
+
+        found["clouds"] = make_clouds(values, tables, registers, raw)
+    if is_metered(tables):
+        from tankcal.job.liquid import make_metering
+
+        found["liquid"] = make_metering(values, tables, registers, raw)
+    if has_radii(tables):
+        from tankcal.job.radii import make_radii
+
+        radii, change = make_radii(values, tables, attached.radii_covariance_m2)
+        found |= {"radii": radii, "change": change}
+    if has_great_circles(tables):
+        from tankcal.job.great_circles import make_great_circles
+
+        found["great_circles"] = make_great_circles(tables, registers)
+    return found
 
 
 def _read_tables(raw, registers, is_whole, log):

@@ -5,7 +5,6 @@ import numpy as np
 import tankcal.clouds
 from tankcal.job.checking import has_rows
 from tankcal.job.checks.clouds import has_network, poses_of, scans_of, unit_of
-from tankcal.job.checks.extent import has_clouds
 from tankcal.job.contract.clouds import ASSUMED
 from tankcal.job.contract.shorthand import FREE
 from tankcal.job.hits import USUAL_INCIDENCE_MM
@@ -19,9 +18,7 @@ SCANNER = "scanner"  # the name of one that has none
 
 
 def make_clouds(values, tables, registers, raw):
-    """Clouds of a job without problems; None: it has none."""
-    if not has_clouds(tables):
-        return None
+    """Clouds of a job without problems."""
     given = registers["clouds"]
     files, scans, sides, tools = [], [], [], {}
     for name, one in given.items():

@@ -9,10 +9,8 @@ from tankcal.survey.strapping import Strap, Strapping
 
 
 def make_great_circles(tables, registers):
-    """GreatCircles of tables and registers without problems; None: no sphere was strapped."""
+    """GreatCircles of tables and registers without problems."""
     table = tables["great_circles"]
-    if table is None or not table.rows:
-        return None
     tapes = tapes_of(registers)
     columns = (
         *map(table.of, ("circle", "kind", "azimuth_deg", "reading_m", "s_mm")),

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.job.checks.extent import has_hits
 from tankcal.job.checks.hits import instruments_used, ranging_of
 from tankcal.job.contract.registers import FREE
 from tankcal.job.measuring import ARCSEC, angle_in_rad, setups_of
@@ -15,9 +14,7 @@ AXES = "xyz"
 
 
 def make_hits(tables, registers):
-    """WallHits of tables and registers without problems; None: the wall was not hit."""
-    if not has_hits(tables):
-        return None
+    """WallHits of tables and registers without problems."""
     table, setups = tables["wall_hits"], _setups(tables["setups"], registers)
     names = tuple(table.of("setup"))
     used = dict.fromkeys(setups[name].instrument for name in names)

@@ -2,14 +2,12 @@
 
 import numpy as np
 
-from tankcal.job.checks.lines import at_reference, has_lines, plummets_of, plummets_used
+from tankcal.job.checks.lines import at_reference, plummets_of, plummets_used
 from tankcal.survey.reference_line import ARCSEC, Line, Offset, Plummet, ReferenceLines
 
 
 def make_lines(tables, registers):
-    """ReferenceLines of tables and registers without problems; None: there are no lines."""
-    if not has_lines(tables):
-        return None
+    """ReferenceLines of tables and registers without problems."""
     lines, plummets = tables["lines"], plummets_of(registers)
     used = plummets_used(lines, plummets)
     return ReferenceLines(

@@ -4,7 +4,6 @@ import datetime
 
 import numpy as np
 
-from tankcal.job.checks.extent import is_metered
 from tankcal.job.checks.liquid import meters_read
 from tankcal.job.checks.runs import CHECK
 from tankcal.job.contract.liquid import EXPANSION_SHARE, JOINT, RADIUS_SHARE, TEMPERATURE_SD_K
@@ -14,9 +13,7 @@ _EPOCH = datetime.datetime(2000, 1, 1)
 
 
 def make_metering(values, tables, registers, raw):
-    """Metering of a job without problems; None: nothing was metered."""
-    if not is_metered(tables):
-        return None
+    """Metering of a job without problems."""
     table, given = tables["liquid"], values["liquid"]
     rows, meters = raw.registers["meters"].rows, registers["meters"]
     names = tuple(meters_read(table, meters))

@@ -6,7 +6,6 @@ from pathlib import Path
 from tankcal.job.building import job_of
 from tankcal.job.folder import read_folder
 from tankcal.job.model import Job
-from tankcal.job.sheets import read_workbook
 from tankcal.job.tables import SETTINGS_FILE, Log
 from tankcal.messages import message
 
@@ -95,6 +94,8 @@ def _read(path, log, edited):
         if path.name == SETTINGS_FILE and path.is_file():
             return read_folder(path.parent, log, edited)
         if path.suffix.lower() == ".xlsx" and path.is_file():
+            from tankcal.job.sheets import read_workbook
+
             return read_workbook(path, log, edited)
         found = message("not_found", "not found")
         if path.exists():

@@ -2,17 +2,15 @@
 
 import numpy as np
 
-from tankcal.job.checks.extent import has_radii, is_surveyed
+from tankcal.job.checks.extent import is_surveyed
 from tankcal.job.model.radii import Change, Radii
 
 
 def make_radii(values, tables, covariance_m2):
-    """(Radii, Change) of a job without problems; None for what it does not have.
+    """(Radii, Change) of a job without problems; None: nothing was measured since then.
 
     covariance_m2  (rows, rows) of radii_cov.npz, in the order of radii.csv, or None
     """
-    if not has_radii(tables):
-        return None, None
     table, given = tables["radii"], values["radii"]
     place = {name: i for i, name in enumerate(table.of("course"))}
     order = [place.get(name) for name in tables["courses"].of("course")]

@@ -9,10 +9,8 @@ LEAST_GAUGE_SD_M = 5e-5  # of a mean of gauge readings that nobody gave a standa
 
 
 def make_strapping(values, tables, registers):
-    """Strapping of settings, tables and registers without problems; None: nothing was strapped."""
+    """Strapping of settings, tables and registers without problems."""
     table = tables["circumferences"]
-    if table is None or not table.rows:
-        return None
     tapes, keys = tapes_of(registers), values["strapping"]
     return Strapping(
         straps=_straps(table, tapes),

@@ -2,15 +2,12 @@
 
 import numpy as np
 
-from tankcal.job.checks.extent import has_tangents
 from tankcal.job.measuring import ARCSEC, angle_in_rad, setups_of
 from tankcal.survey.tangents import Tangents
 
 
 def make_tangents(tables, registers):
-    """Tangents of tables and registers without problems; None: there are none."""
-    if not has_tangents(tables):
-        return None
+    """Tangents of tables and registers without problems."""
     table = tables["tangents"]
     return Tangents(
         setup=tuple(table.of("setup")),

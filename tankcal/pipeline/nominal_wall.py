@@ -14,6 +14,7 @@ from tankcal.messages import message
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.strapped_wall import UprightAxis, field_of_readings
 from tankcal.pipeline.tanks import insets_of, shell_zero
+from tankcal.pipeline.tanks.vertical import nominal_inside_m
 from tankcal.pipeline.wall import joints_of
 from tankcal.pipeline.wall_readings import (
     WallReading,
@@ -87,9 +88,3 @@ def find_nominal_wall(job, progress=lambda text: None):
         field_of(all_of_them), field_of, (sites, radius, noise), all_of_them
     )
     return NominalWall(joints, zero, tuple(readings), np.arange(len(readings)), tested, field)
-
-
-def nominal_inside_m(job, course):
-    """Inside radius of a course by the drawing, m."""
-    less = {"middle": 0.5, "outside": 1.0}.get(job.diameter_is, 0.0)
-    return job.tank.nominal_diameter_m / 2 - less * course.thickness_m

@@ -3,7 +3,6 @@
 import numpy as np
 
 from tankcal.gum.coverage import coverage_factor
-from tankcal.pipeline.liquid_checks import CONTROLLED
 from tankcal.record.schema import Saved, filled_from, key
 
 
@@ -254,6 +253,8 @@ def _steps(found, probability):
 
 def _tests(tested):
     """Test quantities; nan where only rounding errors are left of a reading."""
+    from tankcal.pipeline.liquid_checks import CONTROLLED
+
     return np.where(tested.redundancy > CONTROLLED, tested.w, np.nan)
 
 

@@ -6,6 +6,7 @@ judge them, also in ten years. What the figures have in common is in them alread
 
 import numpy as np
 
+from tankcal.pipeline.tanks.vertical import nominal_inside_m
 from tankcal.pipeline.wall_shape import wall_shape_of
 from tankcal.record.schema import Finite, Saved, key
 
@@ -88,8 +89,6 @@ def shape_record(job, wall):
         x, y, _ = 1000 * shape.axis.value_m
         axis = ShapeAxis(heights[low], heights[high], x, y,
                          1000 * shape.axis.u_m[2], shape.axis.dof[2])  # fmt: skip
-    from tankcal.pipeline.nominal_wall import nominal_inside_m
-
     return WallShapeRecord(
         shape.state,
         [

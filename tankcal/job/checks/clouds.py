@@ -2,7 +2,6 @@
 
 import numpy as np
 
-import tankcal.clouds
 from tankcal.errors import InputError
 from tankcal.job.checking import has_rows, is_not_given, missing_beside, name_twice, tell
 from tankcal.job.checks.extent import has_clouds, has_hits, has_survey, has_tangents, tells_by_tape
@@ -103,6 +102,8 @@ def _header(raw, name, given, log):
     if given["file"] is None:
         return None
     path = raw.folder / given["file"]
+    from tankcal.clouds import describe_cloud
+
     tell = _teller(raw, raw.registers["clouds"].file, name, log)
     try:
         if not path.is_file():
@@ -113,7 +114,7 @@ def _header(raw, name, given, log):
             )
             tell("file", text)
             return None
-        header = tankcal.clouds.describe_cloud(path)
+        header = describe_cloud(path)
     except InputError as error:
         log.problems.extend(error.problems)
         return None

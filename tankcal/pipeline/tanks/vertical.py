@@ -104,6 +104,12 @@ def insets_of(job, switches):
     ]
 
 
+def nominal_inside_m(job, course):
+    """Inside radius of a course by the drawing, m."""
+    less = {"middle": 0.5, "outside": 1.0}.get(job.diameter_is, 0.0)
+    return job.tank.nominal_diameter_m / 2 - less * course.thickness_m
+
+
 def shell_volume(wall, insets_m=None, scale=1.0, stretch=1.0, *, departures=()):
     """The shell of courses as the field of its wall has it.
 
