@@ -25,6 +25,7 @@ from tankcal.messages import message
 
 ALPHA, POWER = 0.001, 0.80  # of every test of single readings, and of the blunder it can show
 CRITICAL = 3.29  # of a test statistic: ALPHA, two-sided normal, to the digits of the field
+UNCONTROLLED = 1e-6  # a redundancy number below it is zero: the observation cannot be checked
 WELL_PLACED = 1e-3  # pivot of those that loses three digits of sixteen: above it they will do
 TIED = 9  # digits of test statistics: two readings that control each other alone differ by rounding
 SMALLEST_PIVOT = 1e-12  # of normal equations with ones in the diagonal: below it is rounding

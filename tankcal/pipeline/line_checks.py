@@ -247,12 +247,12 @@ def _off_axis(job, levels, lean):
     """A level whose centre stands far off the axis through those of the others."""
     if len(levels) < FEWEST_LEVELS or not np.isfinite(lean.x):
         return
-    from scipy.stats import theilslopes  # takes long to load
-
     heights = np.array([one.level_m for one in levels])
     centres = np.array([one.centre_m for one in levels])
-    fits = [theilslopes(each, heights) for each in centres.T]
-    axis = np.column_stack([one.intercept + one.slope * heights for one in fits])
+    high, low = np.nonzero(heights[:, None] > heights)
+    slopes = (centres[high] - centres[low]) / (heights[high] - heights[low])[:, None]
+    slope = np.median(slopes, axis=0)  # Theil 1950: of all pairs, so that one level bends nothing
+    axis = np.median(centres, axis=0) + (heights - np.median(heights))[:, None] * slope
     away = np.linalg.norm(centres - axis, axis=1)
     usual = SCALE_OF_MEDIAN * float(np.median(away))
     worst = int(np.argmax(away))

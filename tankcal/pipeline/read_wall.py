@@ -40,6 +40,7 @@ class ReadWall:
     tested: Tested
     field: WallField
     inner_m: np.ndarray | float = field(default=0.0, kw_only=True)  # of plates: not in the field
+    surveyed_as = "read"  # beside points; what was read alone says what it is
 
     def radius_at(self, course, level_m):
         """Mean radius at a height above the table's zero of a course, m."""

@@ -56,7 +56,7 @@ class Surveyed:
 
 
 def is_surveyed_as(survey, kind):
-    """Whether what was surveyed of a tank, or None, is of a kind: the name that a Result has."""
+    """Whether what was surveyed of a tank, or None, is of a kind, as a Result has it."""
     return survey is not None and survey.surveyed_as == kind
 
 

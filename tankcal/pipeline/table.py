@@ -191,7 +191,7 @@ def _doubts_of_survey(job, survey, top_m):
         return check_rings(job, survey)
     if kind == "scan":
         return check_scan(job, survey, top_m)
-    return check_mesh(job, top_m) if kind == "mesh" else ()
+    return () if survey is None else check_mesh(job, top_m)
 
 
 def _doubts_of_wall(job, wall):

@@ -15,10 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.adjust import noncentrality
+from tankcal.adjust import UNCONTROLLED, noncentrality
 from tankcal.planning.model import TAPED
 from tankcal.solver.effects import covariances
-from tankcal.survey.network.reliability import UNCONTROLLED
 from tankcal.survey.observations import ImageCoordinates
 
 # Repeated readings one by one, of which the network of a plan has the mean alone.

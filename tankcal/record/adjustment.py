@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 from scipy.special import gammaincinv
 
-from tankcal.adjust import ALPHA, CRITICAL, POWER, noncentrality
+from tankcal.adjust import ALPHA, CRITICAL, POWER, UNCONTROLLED, noncentrality
 from tankcal.record.adjusted import (
     AdjustedCamera,
     AdjustedInstrument,
@@ -31,7 +31,6 @@ from tankcal.record.images import (
 )
 from tankcal.record.schema import Columns, Saved, filled_from, key
 from tankcal.record.texts import Text, text_of
-from tankcal.survey.network.reliability import UNCONTROLLED, tau_limit
 from tankcal.survey.results import DatumReport, GroupOfReadings, Reading
 
 CONFIDENCE = 0.95  # of the global test and of the intervals of variance factors
@@ -160,6 +159,8 @@ def adjustment_of(adjustment, measurements=None):
 
     measurements  `job.Measurements` that it was made from: settings, formats of the images
     """
+    from tankcal.survey.network.reliability import tau_limit
+
     settings = getattr(measurements, "settings", None)
     test = adjustment.adjusted.test(CONFIDENCE)
     dof = adjustment.redundancy

@@ -16,14 +16,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtri, ndtri
 
-from tankcal.adjust import ALPHA
+from tankcal.adjust import ALPHA, UNCONTROLLED
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver.effects import responses
 from tankcal.survey.observations import Correlated, Layout
 
 CORRELATED = "correlated"  # source of their groups; their residuals stand under their own tables
-UNCONTROLLED = 1e-6
 
 
 @dataclass(frozen=True)

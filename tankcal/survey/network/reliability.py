@@ -19,12 +19,11 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtri, ndtri, stdtrit
 
-from tankcal.adjust import ALPHA, POWER, noncentrality
+from tankcal.adjust import ALPHA, POWER, UNCONTROLLED, noncentrality
 from tankcal.solver.effects import constraint_reactions, own_leverage, own_responses, responses
 from tankcal.survey.network.blocks import test_values
 
 EXACTLY = 1e9  # products: up to here effects are worked out for all points, in about 0.2 s
-UNCONTROLLED = 1e-6  # a redundancy number below it is zero: the observation cannot be checked
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import chdtri
 
-from tankcal.adjust import ALPHA, CRITICAL
+from tankcal.adjust import ALPHA, CRITICAL, UNCONTROLLED
 from tankcal.solver.effects import cofactors_within
 from tankcal.survey.network.blocks import (
     conditional_expectation,
@@ -37,7 +37,6 @@ from tankcal.survey.network.blocks import (
     observations_of,
 )
 from tankcal.survey.network.reactions import HELD
-from tankcal.survey.network.reliability import UNCONTROLLED
 
 # limits of T, by the number of values tested
 LIMITS = (0.0, CRITICAL**2, *(float(chdtri(count, ALPHA)) for count in range(2, 7)))
