@@ -81,6 +81,15 @@ class Paper(PlainPaper):
         with without_collection():
             return rows_of(self.record["adjustment"]["residuals"])
 
+    @cached_property
+    def adjusted_readings(self):
+        """The readings that took part: neither set aside nor only compared, nor held."""
+        return [
+            row
+            for row in self.readings
+            if not row["removed"] and not row["check"] and row["sd"] != 0
+        ]
+
     # ---- blocks
 
     def document(self, part):
