@@ -10,6 +10,7 @@ FILES = (
     *("report.pdf", "report.html"),
 )
 LETTERHEAD = "letterhead.json"  # there when a letterhead was given
+WORKERS = 2  # that set PDFs: each goes on with what the ones before it have in common with it
 _NOT_IN_ALL = (
     "top",
     "budgets",
@@ -67,6 +68,7 @@ def build(record_path, directory, progress=None, language=None, letterhead=None,
 
     from tankcal import record as records
     from tankcal.report.notebook import joined
+    from tankcal.report.paper import ReadRecord
 
     directory = Path(directory)
     beside = directory / "record.json"
@@ -80,7 +82,7 @@ def build(record_path, directory, progress=None, language=None, letterhead=None,
         LETTERHEAD=letterhead and letterhead.save(directory),
     )
     parts = _PARTS if record["capacity"] else _PARTS_OF_SURVEY
-    return set_papers(notebook, directory, parts, progress)
+    return set_papers(notebook, directory, parts, progress, RECORD=ReadRecord(beside, record))
 
 
 def missing(record):
@@ -98,8 +100,10 @@ def missing(record):
     return [part for part, value in known.items() if not value]
 
 
-def set_papers(notebook, directory, parts, progress=None):
+def set_papers(notebook, directory, parts, progress=None, **handed):
     """Execute a notebook in `directory` and write it there with its PDFs and web page.
+
+    A PDF is set as soon as the cells of its part are done, while the others are executed.
 
     Gives the paths, and raises, as `build` does.
 
@@ -112,10 +116,12 @@ def set_papers(notebook, directory, parts, progress=None):
         field table, and so is the web page.
     progress : optional
         Called as progress(done, total) while it works.
+    **handed
+        Parameters of the notebook, as `notebook.execute` takes them.
     """
     from concurrent.futures import ThreadPoolExecutor
 
-    from tankcal.report.document import blocks_of
+    from tankcal.report.document import blocks_of, last_cell
     from tankcal.report.notebook import execute, written
     from tankcal.report.pdf import pdf
     from tankcal.report.web import page
@@ -123,16 +129,21 @@ def set_papers(notebook, directory, parts, progress=None):
     cells = len(notebook["cells"])
     total = cells + len(parts) + 2
     progress = progress or (lambda done, total: None)
-    execute(notebook, directory, on_cell=lambda done: progress(done, total))
+    ends = {name: last_cell(notebook, part) for name, part in parts}
+    pages = {}
 
-    with ThreadPoolExecutor() as pool:  # the typesetter works outside Python
-        pages = {
-            name: pool.submit(pdf, blocks_of(notebook, part), directory) for name, part in parts
-        }
+    def on_cell(done):
+        for name, part in parts:
+            if ends[name] == done:
+                pages[name] = pool.submit(pdf, blocks_of(notebook, part), directory)
+        progress(done, total)
+
+    with ThreadPoolExecutor(WORKERS) as pool:  # the typesetter works outside Python
+        execute(notebook, directory, on_cell, **handed)
         contents = {"report.ipynb": written(notebook).encode("utf-8")}
         contents["report.html"] = page(blocks_of(notebook)).encode("utf-8")
-        for name, one in pages.items():
-            contents[name] = one.result()
+        for name, _ in parts:
+            contents[name] = pages[name].result()
             progress(cells + len(contents), total)
     for name, content in contents.items():
         (directory / name).write_bytes(content)

@@ -32,6 +32,11 @@ def blocks_of(notebook, part="", name="notebook"):
     return _headings_in_steps(found)
 
 
+def last_cell(notebook, part=""):
+    """The number, from 1, of the last cell that `blocks_of` asks for; where none is, of all."""
+    return max((number for number, _ in _cells(notebook, part)), default=len(notebook["cells"]))
+
+
 def _headings_in_steps(found):
     """The blocks with no level of heading left out: a reader's program builds a tree of them."""
     level = 0

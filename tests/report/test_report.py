@@ -13,7 +13,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_outp
 
 from tankcal.errors import TankcalError
 from tankcal.report import FILES, blocks, build
-from tankcal.report.document import blocks_of
+from tankcal.report.document import PARTS, blocks_of, last_cell
 from tankcal.report.latex_math import _FUNCTIONS, _GREEK, _OPERATORS, _SPACES, _SYMBOLS
 from tankcal.report.notebook import execute, joined, written
 from tankcal.report.pdf import pdf
@@ -261,6 +261,32 @@ def notebook_of(*sources):
 def test_failing_cell_stops_the_report_by_name(tmp_path):
     with pytest.raises(TankcalError, match=r"cell 2 \(1 / 0\): ZeroDivisionError"):
         execute(notebook_of("x = 1", "1 / 0"), tmp_path)
+
+
+def test_cells_take_what_is_handed_to_them(tmp_path):
+    """A parameter that is read already is not read again; the notebook says what it said."""
+    notebook = notebook_of("RECORD = 'record.json'", "RECORD['a']")
+    notebook["cells"][0]["metadata"] = {"tags": ["parameters"]}
+    execute(notebook, tmp_path, RECORD={"a": 5})
+    assert notebook["cells"][1]["outputs"][0]["data"] == {"text/plain": "5"}
+    assert notebook["cells"][0]["source"] == "RECORD = 'record.json'"
+
+
+@pytest.mark.slow
+def test_the_record_at_hand_is_not_read_again(short_record, tmp_path, monkeypatch):
+    """Property: the papers are those of the file to the byte."""
+    build(short_record, tmp_path)
+    read = {name: (tmp_path / name).read_bytes() for name in FILES}
+    record = json.loads((tmp_path / "record.json").read_text(encoding="utf-8"))
+    monkeypatch.setattr("tankcal.report.paper.load", None)
+    build(tmp_path / "record.json", tmp_path, record=record)
+    assert {name: (tmp_path / name).read_bytes() for name in FILES} == read
+
+
+def test_last_cell_of_a_part():
+    cells = [new_markdown_cell(tag, metadata={"tags": [tag]}) for tag in PARTS]
+    notebook = new_notebook(cells=[cells[0], new_markdown_cell("my own"), *cells[1:]])
+    assert [last_cell(notebook, part) for part in ("", *PARTS)] == [3, 2, 3, 4]
 
 
 def test_cells_share_their_names_and_show_what_jupyter_would(tmp_path):

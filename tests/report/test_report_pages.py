@@ -8,7 +8,8 @@ import pytest
 import typst
 from paper_pages import filled, lone_headings, pages_of, sparse_pages
 
-from tankcal.report import blocks, build
+from tankcal.report import blocks, build, page_tables
+from tankcal.report.page_tables import prepared
 from tankcal.report.pdf import pdf
 from tankcal.text.languages import LANGUAGES
 from tankcal.text.words import load_words
@@ -195,6 +196,25 @@ def test_the_papers_of_the_example_have_full_pages(example_record, tmp_path, lan
         pages = pages_of(tmp_path / f"{name}.pdf")
         assert sparse_pages(pages) == []
         assert lone_headings(pages, headings) == []
+
+
+@pytest.mark.parametrize("mark", ["", "*"])
+def test_even_rows_stand_where_measured_ones_do(monkeypatch, mark):
+    """Second method: the typesetter measures each row by itself."""
+    rows = [[f"{n / 100:.2f}", f"{n * n}{'.5' * (n % 3 == 0)}", mark] for n in range(430)]
+    heads = [["Height", "m"], ["Volume", "L"], ""]
+    table = blocks.columns_table(heads, rows, "t", ["decimal", "decimal", "left"], across=3)
+    made = [blocks.document(title="T").data, *(one.data for one in lines_above(9)), table.data]
+    assert prepared(table.data)["even"]
+    by_height = pdf(made)
+    monkeypatch.setattr(page_tables, "_ON_ONE_LINE", re.compile("none"))
+    assert not prepared(table.data)["even"]
+    assert pdf(made) == by_height
+
+
+def test_rows_of_long_texts_are_not_even():
+    table = blocks.columns_table(["a"], [["two words"]], "t", ["left"])
+    assert not prepared(table.data)["even"]
 
 
 @pytest.mark.study

@@ -8,8 +8,11 @@ from decimal import Decimal
 
 import openpyxl
 import pytest
+from xlsxwriter.worksheet import Worksheet
 
 from tankcal.report.workbook import write
+from tankcal.report.workbook.look import Column, _longest_number
+from tankcal.report.workbook.sheet import Sheet
 from tankcal.text.digits import decimals_of
 from tankcal.text.words import choice_sentence, load_words, sentence
 
@@ -302,6 +305,47 @@ def test_user_text_stays_text(short, tmp_path):
     for name in ("Certificate", "Choices and provenance", "Points and residuals"):
         assert set(HOSTILE) <= set(texts(book[name]))
     assert book["Capacity"].oddFooter.center.text == f"Certificate No. {HOSTILE[1]}"
+
+
+class CellByCell(Worksheet):
+    """Second method: XlsxWriter's own sheet."""
+
+    def write_numbers(self, first_row, column, values, looks):
+        for row, (value, look) in enumerate(zip(values, looks, strict=True), first_row):
+            if value is not None:
+                self.write_number(row, column, value, look)
+
+
+@pytest.mark.slow
+def test_columns_of_numbers_are_the_cells_of_xlsxwriter(short, tmp_path, monkeypatch):
+    write(short, tmp_path / "columns.xlsx")
+    monkeypatch.setattr("tankcal.report.workbook.book.Sheet", CellByCell)
+    write(short, tmp_path / "cells.xlsx")
+    assert (tmp_path / "columns.xlsx").read_bytes() == (tmp_path / "cells.xlsx").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("first_row", "value", "error"),
+    [(0, float("nan"), TypeError), (0, float("inf"), TypeError), (2**20, 1.0, ValueError)],
+)
+def test_a_number_that_no_cell_holds_is_refused(first_row, value, error):
+    with pytest.raises(error):
+        Sheet().write_numbers(first_row, 0, [None, value], [None, None])
+
+
+@pytest.mark.parametrize(
+    ("cells", "digits", "length"),
+    [
+        ([0.5, -1e-9, 3.0], 3, 6),  # -0.000
+        ([1.0, 123.4, None], [0, 2, 5], 6),
+        ([-5.0, 99.996], 2, 6),
+        ([1.0, "none"], [2, 2], 4),
+        ([None], "0.0E+00", 7),
+        ([], 2, 0),
+    ],
+)
+def test_the_longest_number_of_a_column(cells, digits, length):
+    assert _longest_number(Column("", cells, digits)) == length
 
 
 @pytest.mark.slow

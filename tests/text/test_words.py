@@ -92,3 +92,12 @@ def test_a_value_with_braces_stays_as_it_is():
 def test_a_language_without_words_is_said():
     with pytest.raises(TankcalError, match=r"'tlh'; shipped: .*en"):
         load_words("tlh")
+
+
+def test_words_are_the_callers_own():
+    words = load_words("en")
+    words["choices"].clear()
+    assert load_words("en")["choices"]
+    assert load_words("en", ["choices", "page"]) == {
+        name: load_words("en")[name] for name in ("choices", "page")
+    }

@@ -202,10 +202,7 @@ def _photo_names(photos, xy):
 @styled
 def distributions(paper):
     """Histogram of w against the normal distribution, and of the redundancy numbers."""
-    rows = [
-        row for row in paper.readings
-        if not row["removed"] and not row["check"] and row["sd"] != 0
-    ]  # fmt: skip
+    rows = paper.adjusted_readings
     w = np.array([row["w"] for row in rows if row["controlled"] and row["w"] is not None])
     redundancy = np.array([row["redundancy"] for row in rows if row["redundancy"] is not None])
     figure = Figure(figsize=(WIDTH, 2.5))
@@ -237,22 +234,25 @@ def shown_photos(paper):
     return [one for one in photos if one["photo"] in names]
 
 
-def vectors_factor(paper):
-    """How many times larger than the image its residuals are drawn."""
-    return _vectors_factor(paper, _image_residuals(paper))
+def vectors_factor(paper, of_photo=None):
+    """How many times larger than the image its residuals are drawn.
 
-
-def _vectors_factor(paper, of_photo):
+    of_photo  as `image_residuals` gives it
+    """
+    of_photo = image_residuals(paper) if of_photo is None else of_photo
     size = [np.abs(v).max(initial=0.0) for _, v, _ in of_photo.values()]
     half = max(_half(paper))
     return round_factor(0.4 * half / max(size)) if max(size, default=0.0) > 0 else 1
 
 
 @styled
-def photo_residuals(paper):
-    """Residuals of the image points as vectors, one panel a photo; crosses were set aside."""
-    photos, of_photo = shown_photos(paper), _image_residuals(paper)
-    factor, half = _vectors_factor(paper, of_photo), _half(paper)
+def photo_residuals(paper, of_photo=None):
+    """Residuals of the image points as vectors, one panel a photo; crosses were set aside.
+
+    of_photo  as `image_residuals` gives it
+    """
+    of_photo = image_residuals(paper) if of_photo is None else of_photo
+    photos, factor, half = shown_photos(paper), vectors_factor(paper, of_photo), _half(paper)
     across = 4
     down = ceil(len(photos) / across)
     shape = half[1] / half[0]
@@ -293,24 +293,22 @@ def _half(paper):
     return np.maximum(np.max(edges, axis=0), 1e-6)
 
 
-def _image_residuals(paper):
+def image_residuals(paper):
     """{photo: (xy (n, 2), residuals (n, 2), xy set aside (m, 2))}, mm, of the photos shown."""
-    wanted = {one["photo"] for one in shown_photos(paper)}
-    values, residuals, used = {}, {}, {}
+    found = {one["photo"]: {} for one in shown_photos(paper)}
     for row in paper.readings:
-        if row["kind"] == "image coordinate" and row["ids"][0] in wanted and not row["check"]:
-            key = (row["ids"][0], row["ids"][1], row["row"])
-            axis = "xy".index(row["element"])
-            values.setdefault(key, [0.0, 0.0])[axis] = row["value"]
-            residuals.setdefault(key, [0.0, 0.0])[axis] = row["residual"] or 0.0
-            used[key] = used.get(key, True) and not row["removed"]
-    found = {}
-    for photo in wanted:
-        keys = [key for key in values if key[0] == photo]
-        kept = [key for key in keys if used[key]]
-        found[photo] = (
-            np.array([values[key] for key in kept]).reshape(-1, 2),
-            np.array([residuals[key] for key in kept]).reshape(-1, 2),
-            np.array([values[key] for key in keys if not used[key]]).reshape(-1, 2),
-        )
-    return found
+        if row["kind"] != "image coordinate" or row["check"] or row["ids"][0] not in found:
+            continue
+        photo, point = row["ids"][:2]
+        reading = found[photo].setdefault((point, row["row"]), [0.0, 0.0, 0.0, 0.0, True])
+        axis = "xy".index(row["element"])
+        reading[axis], reading[2 + axis] = row["value"], row["residual"] or 0.0
+        reading[4] = reading[4] and not row["removed"]
+    arrays = {
+        photo: np.array([*readings.values()]).reshape(-1, 5) for photo, readings in found.items()
+    }
+    used = {photo: array[:, 4] > 0 for photo, array in arrays.items()}
+    return {
+        photo: (array[used[photo], :2], array[used[photo], 2:4], array[~used[photo], :2])
+        for photo, array in arrays.items()
+    }

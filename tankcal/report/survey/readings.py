@@ -1,18 +1,13 @@
 """Single readings: those set aside, those that fit worst, those that nothing controls."""
 
+from heapq import nlargest
+
 from tankcal.record.plain_data import columns_of, rows_of
 from tankcal.report.survey.common import MOST_ROWS, with_note
 from tankcal.report.tables.readings import READINGS, in_their_units
 
 WORST = 16  # rows of a table of the worst readings
 WEAK = 0.1  # redundancy number below which a blunder has to be 13 sds to be found
-
-
-def adjusted(paper):
-    """Readings that took part: neither set aside nor only compared, nor held."""
-    return [
-        row for row in paper.readings if not row["removed"] and not row["check"] and row["sd"] != 0
-    ]
 
 
 def held(paper):
@@ -40,15 +35,17 @@ def removed(paper):
 
 def largest(paper):
     """Readings with the largest w of those that were adjusted."""
-    controlled = [row for row in adjusted(paper) if row["controlled"] and row["w"] is not None]
-    return sorted(controlled, key=lambda row: -abs(row["w"]))[:WORST]
+    rows = paper.adjusted_readings
+    controlled = [row for row in rows if row["controlled"] and row["w"] is not None]
+    return nlargest(WORST, controlled, key=lambda row: abs(row["w"]))
 
 
 def control(paper):
     """What nothing controls, and where an undetected blunder would do most."""
-    a, alone = paper.record["adjustment"], [row for row in adjusted(paper) if not row["controlled"]]
-    numbers_of = [row["redundancy"] for row in adjusted(paper) if row["controlled"]]
-    found = table(paper, "uncontrolled", alone, count=len(alone), all=len(adjusted(paper)))
+    a, rows = paper.record["adjustment"], paper.adjusted_readings
+    alone = [row for row in rows if not row["controlled"]]
+    numbers_of = [row["redundancy"] for row in rows if row["controlled"]]
+    found = table(paper, "uncontrolled", alone, count=len(alone), all=len(rows))
     if not alone and numbers_of:
         smallest, largest, mean = (
             paper.number(value, digits=2)
@@ -71,8 +68,9 @@ def control(paper):
 
 def _weakest(paper):
     """Readings whose undetected bias would move a point most."""
-    felt = [row for row in adjusted(paper) if row["controlled"] and row["effect_m"] is not None]
-    return sorted(felt, key=lambda row: -row["effect_m"])[:WORST]
+    rows = paper.adjusted_readings
+    felt = [row for row in rows if row["controlled"] and row["effect_m"] is not None]
+    return nlargest(WORST, felt, key=lambda row: row["effect_m"])
 
 
 def compared(paper):

@@ -19,6 +19,7 @@ from tankcal.report.workbook.look import (
     lines_of,
     number_format,
 )
+from tankcal.report.workbook.sheet import Sheet
 from tankcal.report.workbook.writer import Writer
 
 RECORD_PROPERTY = "record.json SHA-256"  # `tankcal verify` looks for it
@@ -147,15 +148,13 @@ class Book(Writer):
             digits, count = column.digits, len(column.cells)
             each = digits if isinstance(digits, list) else [digits] * count
             looks = {one: self.format(num_format=number_format(one)) for one in set(each)}
-            for row, (value, one) in enumerate(zip(column.cells, each, strict=True), start=1):
-                if value is not None:
-                    sheet.write_number(row, place, value, looks[one])
+            sheet.write_numbers(1, place, column.cells, [looks[one] for one in each])
         return sheet
 
     def _page(self, code, landscape, tab):
         """A new protected sheet with page set-up, header and footer."""
         name = self.sheet_name(code)
-        sheet = self._file.add_worksheet(name)
+        sheet = self._file.add_worksheet(name, Sheet)
         if self._shown is not None and code not in self._shown:
             sheet.hide()
         sheet.hide_gridlines(2)

@@ -122,11 +122,19 @@ def _longest_number(column):
     if column.digits is None:
         return 0
     each = column.digits if isinstance(column.digits, list) else [column.digits] * len(column.cells)
-    longest = max(map(_length_of_number, column.cells, each), default=0)
+    of_digits = {}
+    for value, digits in zip(column.cells, each, strict=True):
+        of_digits.setdefault(digits, []).append(value)
+    longest = max((_longest(values, digits) for digits, values in of_digits.items()), default=0)
     return longest + (len(" %") if column.percent else 0)
 
 
-def _length_of_number(value, digits):
-    if value is None or isinstance(value, str) or isinstance(digits, str):
-        return len(digits if isinstance(digits, str) else value or "")
-    return len(f"{value:.{digits}f}")
+def _longest(values, digits):
+    """The letters of the longest of some cells: of numbers that is the least or the greatest."""
+    if isinstance(digits, str):
+        return len(digits)
+    texts = [value for value in values if isinstance(value, str)]
+    numbers = [value for value in values if value is not None and not isinstance(value, str)]
+    if numbers:
+        texts += [f"{value:.{digits}f}" for value in (min(numbers), max(numbers))]
+    return max(map(len, texts), default=0)

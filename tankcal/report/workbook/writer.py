@@ -147,19 +147,17 @@ class Writer:
 
     def _cells(self, sheet, first, place, column, muted):
         """The cells of a column; a table may have a million: each look is made once."""
-        each = isinstance(column.digits, list)
-        looks = {}
-        for index, value in enumerate(column.cells):
-            digits = column.digits[index] if each else column.digits
-            key = digits, index in muted
-            if key not in looks:
-                look = self._cell_look(*key, column.percent)
-                looks[key] = look, self.format(**look)
-            look, made = looks[key]
-            if isinstance(value, float):
-                sheet.write_number(first + index, place, value, made)
-            else:
-                self.put(sheet, first + index, place, value, **look)
+        cells, digits = column.cells, column.digits
+        each = digits if isinstance(digits, list) else [digits] * len(cells)
+        keys = [(one, index in muted) for index, one in enumerate(each)]
+        looks = {key: self._cell_look(*key, column.percent) for key in dict.fromkeys(keys)}
+        if any(type(value) is float for value in cells):
+            numbers = [value if type(value) is float else None for value in cells]
+            made = {key: self.format(**look) for key, look in looks.items()}
+            sheet.write_numbers(first, place, numbers, [made[key] for key in keys])
+        for row, (value, key) in enumerate(zip(cells, keys, strict=True), first):
+            if type(value) is not float:
+                self.put(sheet, row, place, value, **looks[key])
 
     @staticmethod
     def _cell_look(digits, muted, percent):
