@@ -18,8 +18,9 @@ from functools import cached_property
 
 import numpy as np
 
-from tankcal.gum.coverage import coverage_factor, effective_dof
+from tankcal.gum.coverage import coverage_factor, dof_of, least_of, sum_of_fourths
 
+BLOCK = 1024  # rows at once: copies of them stay in the processor's cache
 ROUNDING = 1e-12  # of the largest volume of a table: less than that is lost in its digits
 
 
@@ -111,8 +112,7 @@ def scale_source(source, factors):
         return replace(source, columns_m3=factor * source.columns_m3, u=u)
     pairs = zip(source.parts, factors, strict=True)
     parts = tuple(scale_source(part, [factor]) for part, factor in pairs)
-    columns = np.hstack([part.columns_m3 for part in parts]) @ triangular(source.correlation)
-    return replace(source, columns_m3=columns, parts=parts)
+    return replace(source, columns_m3=_mixed(parts, source.correlation), parts=parts)
 
 
 def declared_source(one, derivative, estimate=None):
@@ -255,16 +255,25 @@ def _together(names, sources, pairs):
         for j, other in enumerate(names):
             if i != j:
                 correlation[i, j] = pairs.get(frozenset((one, other)), 0.0)
-    columns = np.hstack([part.columns_m3 for part in parts])
     return Source(
         " & ".join(names),
-        columns @ triangular(correlation),
+        _mixed(parts, correlation),
         together_dof([part.u_dof for part in parts]),
         type="B",
         is_default=any(part.is_default for part in parts),
         parts=parts,
         correlation=correlation,
     )
+
+
+def _mixed(parts, correlation):
+    """(rows, n) columns of parts that are correlated, each a column with its rows in a row."""
+    mix, rows = triangular(correlation).T, len(parts[0].columns_m3)
+    columns = np.empty((len(parts), rows))
+    for start in range(0, rows, BLOCK):
+        some = slice(start, start + BLOCK)
+        np.matmul(mix, [part.columns_m3[some, 0] for part in parts], out=columns[:, some])
+    return columns.T
 
 
 def together_dof(dof):
@@ -315,7 +324,8 @@ class Combined:
     @cached_property
     def effective_dof(self):
         """(rows,) effective degrees of freedom, Welch-Satterthwaite; inf without finite ones."""
-        return effective_dof(np.sqrt(self.variances), self.dof)
+        fourths = sum_of_fourths(self.variances, self.dof)
+        return dof_of(np.sum(self.variances, axis=1), fourths, least_of(self.dof))
 
     def k(self, probability):
         """(rows,) coverage factor for that coverage probability, of Student's t."""

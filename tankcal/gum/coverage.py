@@ -3,8 +3,11 @@
 Source: JCGM 100:2008 (GUM) G.4.
 """
 
+from functools import cache
+
 import numpy as np
 from numpy.polynomial import Chebyshev
+from numpy.polynomial.chebyshev import cheb2poly
 from scipy.special import ndtri, stdtrit
 
 _SMOOTH_DOF, _DEGREE = 3.0, 20  # from where on, and of what degree, k is a polynomial in 1/dof
@@ -158,9 +161,24 @@ def _student(upper, dof):
     smooth = dof >= _SMOOTH_DOF
     if np.count_nonzero(smooth) <= _DEGREE:
         return stdtrit(dof, upper)
-    inverse = Chebyshev.interpolate(
-        lambda x: stdtrit(1 / x, upper), _DEGREE, domain=[0, 1 / _SMOOTH_DOF]
-    )
     k = np.empty(len(dof))
-    k[smooth], k[~smooth] = inverse(1 / dof[smooth]), stdtrit(dof[~smooth], upper)
+    k[smooth], k[~smooth] = _by_polynomial(upper, dof[smooth]), stdtrit(dof[~smooth], upper)
     return k
+
+
+def _by_polynomial(upper, dof):
+    """(n,) quantiles of t, in x = 2 * _SMOOTH_DOF / dof - 1 from -1 to 1, by Horner in place."""
+    x = 2 * _SMOOTH_DOF / dof - 1
+    last, *others = reversed(_powers_of(upper))
+    k = np.full(len(x), last)
+    for coefficient in others:
+        k *= x
+        k += coefficient
+    return k
+
+
+@cache
+def _powers_of(upper):
+    """Coefficients by the powers of x of the Chebyshev polynomial."""
+    at = Chebyshev.interpolate(lambda x: stdtrit(2 * _SMOOTH_DOF / (x + 1), upper), _DEGREE)
+    return tuple(cheb2poly(at.coef))

@@ -87,7 +87,9 @@ class ShellPart(Part):
         """
         wet = np.maximum(levels_m, 0.0)
         features = self.volume.features, self.volume.girth_features, self.volume.scale_features
-        volume, loss, by_scale = self.volume.integrated(wet, np.column_stack(features)).T
+        departures = {name: self.volume.missed_features(name) for name in self.volume.departures}
+        columns = np.column_stack([*features, *departures.values(), *self.read_with.values()])
+        volume, loss, by_scale, *others = self.volume.integrated(wet, columns).T
         area = self.area_m2(levels_m)
         by_length = 2 * volume / self.scale
         if self.stretch != 1.0:
@@ -102,14 +104,13 @@ class ShellPart(Part):
             "scale": by_scale,
             "datum": area,
             "offset": loss,
-            **{name: self.volume.by_missed_m2(wet, name) for name in self.volume.departures},
+            **dict(zip(departures, others, strict=False)),
             "course_heights": self.volume.by_course_heights_m2(wet),
             "tilt": volume * self.tilt / (1 + self.tilt**2),
             **{name: of_corrections[name] for name in self.bearing},
         }
         found = {name: one for name, one in found.items() if name not in self.unused}
-        for name, column in self.read_with.items():
-            by_readings = self.volume.integrated(wet, column[:, None])[:, 0]
+        for name, by_readings in zip(self.read_with, others[len(departures) :], strict=True):
             found[name] = found.get(name, 0.0) + by_readings
         return found
 

@@ -41,6 +41,11 @@ class ShellVolume:
         return self.courses[-1].top_m
 
     @property
+    def joints_m(self):
+        """(courses - 1,) bottoms of all courses but the first."""
+        return np.array([course.bottom_m for course in self.courses[1:]])
+
+    @property
     def joint_steps_m2(self):
         """(courses - 1,) area just below each joint less the area just above it."""
         polynomials = self._by_height(self.features)
@@ -74,13 +79,39 @@ class ShellVolume:
         return np.concatenate([course.by_scale_m2 for course in self.courses])
 
     def integrated(self, heights_m, features):
-        """(rows, ...) sums over the features of the volume below each height, m times their unit.
+        """Sums over the features of the volume below each height.
 
-        features (f,) or (f, c): each column stands for the areas of all courses.
-        Raises HeightError for a height outside the shell.
+        Parameters
+        ----------
+        heights_m : array_like, shape (rows,)
+        features : array_like, shape (f,) or (f, c)
+            Each column stands for the areas of all courses.
+
+        Returns
+        -------
+        ndarray, shape (rows,) or (rows, c)
+            m times the unit of the features; the rows of a column are next to each other.
+
+        Raises
+        ------
+        HeightError
+            For a height outside the shell.
+
+        Notes
+        -----
+        Rows cost only what they see: the polynomial of their own course, and a sum of those below.
         """
-        features = np.asarray(features, dtype=float)
-        return self._integral(heights_m, self._by_height(features))
+        heights = self._inside(heights_m)
+        columns = np.asarray(features, dtype=float).reshape(len(features), -1)
+        result = np.empty((columns.shape[1], len(heights)))
+        below = np.zeros(columns.shape[1])
+        divisors = np.arange(1.0, LEVELS + 1)[:, None]
+        for course, rows, polynomial in self._by_course(heights, columns):
+            primitive = np.concatenate([below[None], course.height_m * polynomial / divisors])
+            t = (heights[rows] - course.bottom_m) / course.height_m
+            result[:, rows] = primitive.T @ _powers(t)
+            below = primitive.sum(axis=0)
+        return result.T if np.ndim(features) == 2 else result[0]
 
     def weights_m(self, heights_m):
         """(rows, f) derivative of the volume below each height by the features, m.
@@ -97,10 +128,7 @@ class ShellVolume:
         """(rows,) inside area of the horizontal cut at each height; the upper course at a joint."""
         heights = self._inside(heights_m)
         area = np.empty(len(heights))
-        polynomials = self._by_height(self.features)
-        for course, rows, polynomial in zip(
-            self.courses, self._rows(heights), polynomials, strict=True
-        ):
+        for course, rows, polynomial in self._by_course(heights, self.features):
             t = (heights[rows] - course.bottom_m) / course.height_m
             area[rows] = np.polynomial.polynomial.polyval(t, polynomial)
         return area
@@ -118,13 +146,15 @@ class ShellVolume:
         After one ring in the middle of each course nobody knows of a barrel: b zeta^2 is lacking,
         and -1/3 of b in the volume of a course.
         """
-        missed = [course.girths_m * course.missed[name] for course in self.courses]
+        missed = self.missed_features(name)
         if not each:
-            return self.integrated(heights_m, np.concatenate(missed))
-        own = np.zeros((len(self.features), len(missed)))
-        for index, one in enumerate(missed):
-            own[index * LEVELS : (index + 1) * LEVELS, index] = one
-        return self.integrated(heights_m, own)
+            return self.integrated(heights_m, missed)
+        own = np.kron(np.eye(len(self.courses)), np.ones((LEVELS, 1)))
+        return self.integrated(heights_m, own * missed[:, None])
+
+    def missed_features(self, name):
+        """(f,) derivative of the features by a departure that was not declared, of all courses."""
+        return np.concatenate([one.girths_m * one.missed[name] for one in self.courses])
 
     def by_course_heights_m2(self, heights_m):
         """(rows, courses) derivative of the volume below each height by the height of each course.
@@ -132,10 +162,9 @@ class ShellVolume:
         A higher course lifts every joint above it, which gives the area below the joint in place of
         the one above. The outlines stay where they were surveyed.
         """
-        heights = self._inside(heights_m)
-        passed = np.searchsorted([course.bottom_m for course in self.courses[1:]], heights)
+        passed = np.searchsorted(self.joints_m, self._inside(heights_m))
         steps = np.concatenate([[0.0], np.cumsum(self.joint_steps_m2)])
-        return np.tril(steps[:, None] - steps)[passed]
+        return np.take(np.tril(steps[:, None] - steps).T, passed, axis=1).T
 
     @property
     def barrels_m(self):
@@ -152,35 +181,17 @@ class ShellVolume:
             for start in range(0, len(features), LEVELS)
         ]
 
-    def _integral(self, heights_m, polynomials):
-        """(rows, ...) integral below each height of a polynomial in t of each course.
-
-        Rows cost only what they see: the polynomial of their own course, and a sum of those below.
+    def _by_course(self, heights, features):
+        """(course, its rows, polynomial) of each course: the rows that end in it, the upper one at
+        a joint, as a slice where all heights ascend.
         """
-        heights = self._inside(heights_m)
-        of_courses = self._rows(heights)
-        powers = np.ones((1 + max(map(len, polynomials)), len(heights)))
-        for course, rows in zip(self.courses, of_courses, strict=True):
-            powers[1, rows] = (heights[rows] - course.bottom_m) / course.height_m
-        for power in range(2, len(powers)):
-            np.multiply(powers[power - 1], powers[1], out=powers[power])
-        result = np.empty((len(heights), *polynomials[0].shape[1:]))
-        below = np.zeros(polynomials[0].shape[1:])
-        for course, rows, polynomial in zip(self.courses, of_courses, polynomials, strict=True):
-            divisors = np.arange(1, len(polynomial) + 1).reshape(-1, *[1] * below.ndim)
-            primitive = np.concatenate([below[None], course.height_m * polynomial / divisors])
-            result[rows] = powers[: len(primitive), rows].T @ primitive
-            below = primitive.sum(axis=0)
-        return result
-
-    def _rows(self, heights):
-        """The rows that end in each course, the upper one at a joint: slices where they ascend."""
-        joints = [course.bottom_m for course in self.courses[1:]]
         if np.all(heights[1:] >= heights[:-1]):
-            ends = [0, *np.searchsorted(heights, joints), len(heights)]
-            return [slice(start, end) for start, end in pairwise(ends)]
-        place = np.searchsorted(joints, heights, side="right")
-        return [place == index for index in range(len(self.courses))]
+            ends = [0, *np.searchsorted(heights, self.joints_m), len(heights)]
+            rows = [slice(start, end) for start, end in pairwise(ends)]
+        else:
+            place = np.searchsorted(self.joints_m, heights, side="right")
+            rows = [place == index for index in range(len(self.courses))]
+        return zip(self.courses, rows, self._by_height(features), strict=True)
 
     def _inside(self, heights_m):
         heights = np.atleast_1d(np.asarray(heights_m, dtype=float))
@@ -195,6 +206,15 @@ class ShellVolume:
                 )
             )
         return heights
+
+
+def _powers(t):
+    """(LEVELS + 1, rows) powers of t from the 0th on."""
+    powers = np.empty((LEVELS + 1, len(t)))
+    powers[0], powers[1] = 1.0, t
+    for power in range(2, LEVELS + 1):
+        np.multiply(powers[power - 1], t, out=powers[power])
+    return powers
 
 
 @cache

@@ -51,7 +51,18 @@ class QuadraticRows:
 
     def forms(self, d):
         """(draws, k) quadratic forms d' H_k d."""
-        return np.stack([np.einsum("na,na->n", d @ h, d) for h in self.hessians], axis=1)
+        found = np.zeros((len(d), len(self.hessians)))
+        for form, felt, hessian in self.own_blocks():
+            part = d[:, felt]
+            found[:, form] = np.einsum("na,na->n", part @ hessian, part)
+        return found
+
+    def own_blocks(self):
+        """(k, inputs, block) of each H_k that is not 0: the inputs that it has, and its part."""
+        for form, hessian in enumerate(self.hessians):
+            felt = np.flatnonzero(np.any(hessian != 0, axis=0))
+            if len(felt):
+                yield form, felt, hessian[np.ix_(felt, felt)]
 
     def subset(self, rows):
         """The same model with some of its rows."""
@@ -92,8 +103,9 @@ class Lines:
         self.rows, self.direction, self.shapes, self.scale = rows, direction, shapes, scale
         self.slope = np.sum(rows.jacobian * direction, axis=1)
         self.twist = np.zeros_like(direction)
-        for hessian, weight in zip(rows.hessians, rows.weights.T, strict=True):
-            self.twist += (2 * weight[:, None]) * (direction @ hessian)
+        for form, felt, hessian in rows.own_blocks():
+            weight = 2 * rows.weights[:, form, None]
+            self.twist[:, felt] += weight * (direction[:, felt] @ hessian)
         self.bend = np.sum(self.twist * direction, axis=1) / 2
         self.reach = np.where(together, 1.0, scale[largest])
         self.pure = ~np.any(others != 0, axis=1)  # normal inputs only: the linear part is exact
@@ -121,7 +133,7 @@ class Lines:
         slope = self.slope[block] + e @ self.twist[block].T
         bend, reach = self.bend[block], self.reach[block]
         near = np.mean(slope < 2 * STEADY * np.abs(bend) * reach, axis=0)
-        cdf, exact = self._cdf(along, a), np.all(self.pure[block])
+        cdf, exact = self._cdf(along), np.all(self.pure[block])
         found = np.empty((sets, len(block), len(levels)))
         for i, level in enumerate(levels):
             inside = cdf(place + _root(targets[:, i] - value, slope, bend))
@@ -131,16 +143,12 @@ class Lines:
             found[:, :, i] = inside.reshape(sets, -1, len(block)).mean(axis=1)
         return found, near
 
-    def _cdf(self, along, direction):
+    def _cdf(self, along):
+        """Of the place along a direction: every input is symmetric, whichever way it points."""
         if along < 0:
             return ndtr
-        shape, scale, sign = self.shapes[along], self.scale[along], direction[:, along]
-
-        def cdf(value):
-            below = shape.cdf(sign * value / scale)
-            return np.where(sign > 0, below, 1 - below)
-
-        return cdf
+        shape, scale = self.shapes[along], self.scale[along]
+        return lambda value: shape.cdf(value / scale)
 
 
 def _root(gap, slope, bend):
