@@ -92,6 +92,8 @@ def wall_item(change):
         "traverse": message(
             "plan_item_traverse", "each reading between stations, with half its s_mm and s_arcsec"
         ),
+        "bar": message("plan_item_bar", "{name} over the stations of the traverse", name=name),
+        "ranging": message("plan_item_ranging", "distances between the stations"),
         "certificate": message(
             "plan_item_certificate", "the calibration of {name}, with half its u", name=name
         ),

@@ -54,7 +54,11 @@ def assemble_plan(job, given, bars, folder):
         obstacles=tuple(_obstacle(one) for one in given.repeated["obstacles"]),
         limits=limits_of(given.single["limits"]),
         bases=bases_of(given.stadia, bars),
-        bars={name: one["length_m"] for name, one in bars.items() if one["length_m"]},
+        bars={
+            name: one["length_m"]
+            for name, one in bars.items()
+            if one["length_m"] and one["u_mm"] is not None
+        },
         amplitudes=_amplitudes(pattern),
         costs={key: value or 0.0 for key, value in given.single["costs"].values.items()},
         folder=folder,

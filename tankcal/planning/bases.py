@@ -90,10 +90,12 @@ def new_bases(plan):
         return ()
     like = plan.bases[0] if plan.bases else Base("", "", next(iter(plan.bars)), NEW_SD_RAD)
     there = {frozenset((one.setup, one.to)) for one in plan.bases}
-    sights = [(one.name, other) for one in plan.setups for other in one.sights]
-    pairs = {frozenset(ends): ends for ends in reversed(sights)}
+    pairs = {}
+    for one in plan.setups:
+        for other in one.sights:
+            pairs.setdefault(frozenset((one.name, other)), (one.name, other))
     return tuple(
         tuple(replace(like, setup=a, to=b, row=None) for a, b in (ends, ends[::-1]))
-        for key, ends in reversed(pairs.items())
+        for key, ends in pairs.items()
         if key not in there
     )

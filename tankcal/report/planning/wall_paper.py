@@ -105,12 +105,14 @@ def wall_sheets(paper):
         "hit_setups": "hits",
         "control_targets": "control_targets",
         "tangent_stations": "tangents",
+        "bases": "bases",
     }
     found = [*paper.head("field_sheets"), paper.facts(_counts(paper))]
     found += paper.warnings(paper.plan.warnings)
     for name, one in tables.items():
         if name in heads:
-            found += [paper.heading(heads[name]), paper.paragraph(f"wall_{heads[name]}")]
+            about = name if name == "bases" else f"wall_{heads[name]}"
+            found += [paper.heading(heads[name]), paper.paragraph(about)]
         found.append(paper.table(name, *one, across=2 if name in NARROW else None))
     return [
         *found,
