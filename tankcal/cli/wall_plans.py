@@ -76,9 +76,12 @@ def _filling(found):
 
 def wall_item(change):
     """An item of a plan of the wall; None of other plans."""
+    from tankcal.planning.wall.changes import NUMBERED
     from tankcal.planning.wall.model import WallPlan
 
     name = change.name
+    if change.item in NUMBERED:
+        name = name.replace(".", marks().decimal)
     told = {
         "strap": message("plan_item_strap", "circumference {name}", name=name),
         "line": message("plan_item_lines", "{name} reference lines", name=name),

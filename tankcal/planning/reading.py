@@ -223,7 +223,7 @@ def _read(folder, log):
                 registers[name] = read_register_file(f"{name}.toml", register, log)
     raw = RawJob(
         folder.resolve().name, folder, PLAN_FILE, settings, sections, tables,
-        files=tuple(files), registers=registers,
+        files=tuple(files), registers=registers, is_planned=True,
     )  # fmt: skip
     ties = {name: _table(name, tables.get(name), log) for name in TABLES}
     return raw, Given(single, repeated, ties, ties.pop("stadia"), is_wall=is_wall)

@@ -126,3 +126,15 @@ def test_bad_bar_is_one_line(tmp_path, in_plan, in_register, place, capsys):
     assert [(one.file, one.column) for one in error.value.problems] == [place], told
     assert main(["plan", str(folder), "--quiet"]) == 2
     assert "Traceback" not in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_numbers_in_names_of_changes(tmp_path):
+    """A station of the traverse is called by its radius, in the marks of the language."""
+    plan = load_plan(plan_of(tmp_path, TANGENTS, ("radius_m = 12.5", "radius_m = 12.75")))
+    found = next(one for one in changes_of(plan, ("add",), ("station",)))
+    assert "." in found.name
+    prediction = predict(plan)
+    papers = {one: WallPaper(prediction, one).change(found) for one in ("en", "pt-BR")}
+    assert found.name in papers["en"]
+    assert found.name.replace(".", ",") in papers["pt-BR"]

@@ -20,6 +20,7 @@ SEARCHED = (
 WALL_ITEMS = (  # the last are no part of a design
     *(*SEARCHED, "accuracy", "traverse", "certificate", "meter", "batches"),
 )
+NUMBERED = ("level", "station")  # items that are named by a number, with a decimal point
 MORE_LINES, BAR_SD_ARCSEC = 4, 1.0  # of what is added
 BETTER = ("u_scale_ppm", "u_offset_mm", "u_collimation_arcsec", "u_incidence_mm", "u_mm")
 MOST_FACES, MOST_READINGS, FEWEST_LINES, FEWEST_HITS = 2, 20, 4, 5

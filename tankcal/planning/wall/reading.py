@@ -150,10 +150,15 @@ def _check_lines_and_ties(given, log):
         log.problem(PLAN_FILE, expected, ties.row, "setup_ties")
     _check_control(given, log)
     if ties.filled:
-        for key in ("s_mm", "s_arcsec"):
-            if key not in ties.filled:
-                expected = message("plan_number_missing", "missing; expected a number above 0")
-                ties.tell(log.problem, key, expected)
+        _need(ties, ("s_mm", "s_arcsec"), log)
+
+
+def _need(entry, keys, log):
+    """Numbers without which a section says nothing."""
+    for key in keys:
+        if key not in entry.filled:
+            expected = message("plan_number_missing", "missing; expected a number above 0")
+            entry.tell(log.problem, key, expected)
 
 
 def _check_control(given, log):
@@ -200,9 +205,8 @@ def _check_tangents(given, nominal_m, log):
             " tells the scale",
         )
         traverse.tell(log.problem, "s_mm", expected)
-    elif "bar" in traverse.filled and "s_bar_arcsec" not in traverse.filled:
-        expected = message("plan_number_missing", "missing; expected a number above 0")
-        traverse.tell(log.problem, "s_bar_arcsec", expected)
+    elif "bar" in traverse.filled:
+        _need(traverse, ("s_bar_arcsec",), log)
     for name in ("lines", "hits"):
         other = given.single.get(name) or next(iter(given.repeated.get(name, ())), None)
         if other is not None and other.filled:
