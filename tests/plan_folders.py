@@ -43,10 +43,72 @@ def with_setups(folder):
     return folder
 
 
+def with_stadia(folder, rows="T1-1,T1-2,1,2\nT1-2,T1-1,1,2\n"):
+    """Three theodolites within a tank of no example, and a bar between two of them; its rows."""
+    (folder / "plan.toml").write_text(TRIANGULATION)
+    (folder / "courses.csv").write_text("course,height_m,thickness_mm\n1,2.1,9\n2,2.3,8\n3,1.9,6\n")
+    (folder / "instruments.toml").write_text(
+        '[instruments.TH]\nkind = "theodolite"\n\n[instruments."bar 1"]\nkind = "stadia"\n'
+        f"length_m = {BAR_M}\nu_mm = 0.03\n"
+    )
+    if rows:
+        (folder / "stadia.csv").write_text("setup,to,s_arcsec,readings\n" + rows)
+    return folder
+
+
+BAR_M = 2.0
+TRIANGULATION = """
+[tank]
+id = "TRI-7"
+kind = "vertical"
+nominal_diameter_m = 17.3
+nominal_height_m = 6.3
+
+[survey]
+side = "inside"
+date = 2026-10-05
+shell_temperature_c = 26
+
+[datum]
+bottom_z_m = 10.0
+
+[table]
+step_m = 0.1
+reference_temperature_c = 20
+liquid_density_kg_m3 = 0
+
+[adjustment]
+datum = "inner"
+
+[pattern]
+generatrices = 10
+levels = 1
+
+[[setup_rings]]
+instrument = "TH"
+stations = 3
+radius_m = 3.7
+heights_m = [1.6]
+s_direction_arcsec = 3
+s_zenith_arcsec = 4
+
+[costs]
+setup = 50
+base = 10
+reading = 1
+"""
+
+
 def values_of(measurements):
     """{table: {names: {column: value}}} of measurements that have values, in units of a job."""
     found = {"control": {}}
     for one in measurements.readings:
+        if one.file == "stadia.csv":
+            found["stadia"] = {
+                (start, end): {"angle_deg": float(np.degrees(2 * np.arctan(BAR_M / 2 / value)))}
+                for start, end, value in zip(one.start, one.end, one.value, strict=True)
+            }
+            continue
         unit = {"distances": "distance_m", "slope_distances": "distance_m"} | {
             "directions": "direction_deg", "zenith_angles": "zenith_deg",
             "height_differences": "dz_m", "plumb_lines": None,
@@ -58,10 +120,10 @@ def values_of(measurements):
             (start, end): {column: float(np.degrees(value) if angle else value)}
             for start, end, value in zip(starts, one.end, one.value, strict=True)
         }
-    for name, xyz, sd in zip(
-        measurements.control.point, measurements.control.xyz_m, measurements.control.sd_m,
-        strict=True,
-    ):  # fmt: skip
+    known = measurements.control
+    for name, xyz, sd in (
+        () if known is None else zip(known.point, known.xyz_m, known.sd_m, strict=True)
+    ):
         found["control"][name,] = {
             f"{axis}_m": float(x)
             for axis, x, s in zip("xyz", xyz, sd, strict=True)
@@ -73,6 +135,8 @@ def values_of(measurements):
 def image_rows(measurements):
     """Rows of image_points.csv, headings first."""
     images = measurements.image_points
+    if images is None:
+        return []
     names = zip(images.photo, images.point, images.xy_mm.tolist(), strict=True)
     rows = [[photo, point, *map(repr, xy)] for photo, point, xy in names]
     return [["photo", "point", "x_mm", "y_mm"], *rows]
@@ -125,9 +189,9 @@ def names_of(headings, row):
 
 def fill_workbook(path, measurements):
     """Fill the empty job in a workbook as somebody does with a spreadsheet."""
-    headings, *rows = image_rows(measurements)
+    headings, *rows = image_rows(measurements) or [()]
     points = [[photo, point, float(x), float(y)] for photo, point, x, y in rows]
-    fill_form(path, SETTINGS, {"image_points": [headings, *points]})
+    fill_form(path, SETTINGS, {"image_points": [headings, *points]} if rows else {})
     book = openpyxl.load_workbook(path)
     for table, values in values_of(measurements).items():
         sheet = book[table]

@@ -163,12 +163,15 @@ def _simulated(prediction, options, show):
 
 def _summary(prediction):
     """What was planned, and how well points will be known."""
+    from tankcal.planning.bases import by_ends
+
     plan = prediction.plan
     solution = prediction.predicted.adjusted.solution
     parts = [
         message("plan_photographs", "{count} photographs", count=len(plan.photos)),
         planned_setups(len(plan.setups)),
         message("plan_ties", "{count} ties", count=len(plan.ties)),
+        message("plan_bases", "{count} bases of a stadia", count=len(by_ends(plan.bases))),
         message("plan_control", "{count} control points", count=len(plan.known)),
         message("plan_targets", "{count} targets", count=len(plan.targets.names)),
     ]
@@ -298,6 +301,8 @@ def _item(item, name):
         return message("plan_setup", "setup {name}", name=name)
     if item == "tape":
         return message("plan_tape", "tape {name}", name=name)
+    if item == "base":
+        return message("plan_base", "base {name}", name=name)
     if item == "control_point":
         return message("plan_control_point", "control point {name}", name=name)
     if item == "target_row" and name.startswith(OF_COURSE):

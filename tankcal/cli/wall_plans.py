@@ -76,9 +76,12 @@ def _filling(found):
 
 def wall_item(change):
     """An item of a plan of the wall; None of other plans."""
+    from tankcal.planning.wall.changes import NUMBERED
     from tankcal.planning.wall.model import WallPlan
 
     name = change.name
+    if change.item in NUMBERED:
+        name = name.replace(".", marks().decimal)
     told = {
         "strap": message("plan_item_strap", "circumference {name}", name=name),
         "line": message("plan_item_lines", "{name} reference lines", name=name),
@@ -92,6 +95,8 @@ def wall_item(change):
         "traverse": message(
             "plan_item_traverse", "each reading between stations, with half its s_mm and s_arcsec"
         ),
+        "bar": message("plan_item_bar", "{name} over the stations of the traverse", name=name),
+        "ranging": message("plan_item_ranging", "distances between the stations"),
         "certificate": message(
             "plan_item_certificate", "the calibration of {name}, with half its u", name=name
         ),

@@ -21,6 +21,7 @@ from tankcal.survey.measurements import (
     Setup,
     Targets,
 )
+from tankcal.survey.stadia import distance_of_angle_m, distance_sd_m
 
 ARCSEC = np.pi / 180 / 3600
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "dms": np.pi / 180}
@@ -234,9 +235,7 @@ def _readings(name, table):
 
 
 def _stadia_readings(tables, registers):
-    """Distances that a bar of the length b tells, seen under the angle beta.
-
-        d = (b / 2) cot(beta / 2),   derivative by beta -b / (4 sin^2(beta / 2))
+    """Distances that bars tell by the angles under which they are seen.
 
     What the length of a bar is off by is a scale of all its distances.
     """
@@ -247,12 +246,12 @@ def _stadia_readings(tables, registers):
     used = bars_used(table, bars)
     stations = {one.name: one.station for one in setups_of(tables["setups"])}
     length = np.array([bars[name]["length_m"] for name in used])
-    half = angle_in_rad(table, "angle") / 2
+    angle, angle_sd = angle_in_rad(table, "angle"), table.numbers("s_arcsec") * ARCSEC
     return (
         Readings(
             table="distances",
-            value=length / 2 / np.tan(half),
-            sd=length / (4 * np.sin(half) ** 2) * table.numbers("s_arcsec") * ARCSEC,
+            value=distance_of_angle_m(angle, length),
+            sd=distance_sd_m(angle, length, angle_sd),
             start=tuple(stations[name] for name in table.of("setup")),
             end=tuple(table.of("to")),
             check=_check(table),

@@ -22,6 +22,7 @@ MOST_YIELD_MPA = 2000  # of a shell's steel: more is pascals or psi
 
 FIRST_YEAR = 1900  # of a survey
 DAYS_AHEAD = 1  # of a survey, for time zones
+YEARS_PLANNED = 10  # ahead, of a survey that is planned
 DAYS_TO_ISSUE = 60  # a certificate may be prepared before its day
 
 SHELL_C = {AMBIENT: (-35.0, 50.0), HEATED: (-35.0, 300.0), REFRIGERATED: (-200.0, 50.0)}

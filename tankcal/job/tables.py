@@ -215,6 +215,7 @@ class RawJob:
     folder      Path of the folder of job.toml or of the workbook
     registers   {"cameras", "instruments", "clouds" or "meters": Register}
     radii_covariance  bytes of radii_cov.npz, or None
+    is_planned  whether it is still to be measured: its day lies ahead
     """
 
     source: str
@@ -227,6 +228,7 @@ class RawJob:
     files: tuple = field(default=())
     registers: dict = field(default_factory=dict)
     radii_covariance: bytes | None = None
+    is_planned: bool = False
 
     def file_of(self, table):
         """Name of the table's file or sheet in messages, whether it is there or not."""

@@ -5,10 +5,10 @@ from itertools import chain
 import numpy as np
 
 from tankcal.errors import Problem
+from tankcal.job.contract.stadia import KIND
 from tankcal.messages import message
 from tankcal.pipeline.survey_limits import limits_of
 
-KIND = "stadia"  # of an instrument
 UNLIKE_SDS = 3.0  # of the difference of two readings of a base
 
 

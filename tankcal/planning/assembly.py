@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
+from tankcal.planning.bases import bases_of
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.model import Box, Known, Limits, Pillar, Plan, Tie
 from tankcal.planning.patterns import photographs_of, setups_of, shell_of, tape_of, targets_of
@@ -12,8 +13,11 @@ from tankcal.planning.patterns import photographs_of, setups_of, shell_of, tape_
 INCIDENCE_DEG, RAYS = 70.0, 3
 
 
-def assemble_plan(job, given, folder):
-    """The Plan of a Job and what its plan gives beside it (`given.Given`), both sound."""
+def assemble_plan(job, given, bars, folder):
+    """The Plan of a Job and what its plan gives beside it (`given.Given`), both sound.
+
+    bars  {name: {key: value}} of the stadias of its instruments
+    """
     pattern = given.single["pattern"]
     shell = shell_of(job, pattern)
     targets = targets_of(pattern, shell, job.courses)
@@ -28,7 +32,7 @@ def assemble_plan(job, given, folder):
         ties.append(tie)
         extra |= ends
         facing |= dict.fromkeys(ends, out)
-    ties += _listed(given.tables)
+    ties += _listed(given.ties)
     places = dict(zip(targets.names, targets.xyz_m, strict=True)) | extra
     places |= {one.name: one.xyz_m for one in setups}
     known = _known(job.measurements.control, places)
@@ -49,6 +53,12 @@ def assemble_plan(job, given, folder):
         facing=facing,
         obstacles=tuple(_obstacle(one) for one in given.repeated["obstacles"]),
         limits=limits_of(given.single["limits"]),
+        bases=bases_of(given.stadia, bars),
+        bars={
+            name: one["length_m"]
+            for name, one in bars.items()
+            if one["length_m"] and one["u_mm"] is not None
+        },
         amplitudes=_amplitudes(pattern),
         costs={key: value or 0.0 for key, value in given.single["costs"].values.items()},
         folder=folder,

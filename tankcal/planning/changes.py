@@ -5,12 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.errors import TankcalError
+from tankcal.planning.bases import by_ends, new_bases
 from tankcal.planning.model import Known, Plan
 from tankcal.planning.patterns import places_around, row_heights_m, tape_of
 from tankcal.planning.wall.changes import WALL_ITEMS, wall_changes_of, wall_count
 from tankcal.planning.wall.model import WallPlan
 
-ITEMS = ("photo_station", "setup", "tape", "control_point", "target_row", "reading")
+ITEMS = ("photo_station", "setup", "tape", "base", "control_point", "target_row", "reading")
 IMAGES, SETS = "all image points", "all sets of the total station"  # what is read again
 ROW, OF_COURSE = "row ", "row in course "  # how the names of rows begin
 NEW = "N-"  # what the name of a thing that is added begins with
@@ -54,9 +55,10 @@ def cost_of(plan):
         "photograph": len(plan.photos),
         "setup": len(plan.setups),
         "tape": sum(one.table == "distances" for one in plan.ties),
+        "base": len(plan.bases),
         "control_point": len(plan.known),
         "target": len(plan.targets.names),
-        "reading": sum(one.readings - 1 for one in (*plan.photos, *plan.ties))
+        "reading": sum(one.readings - 1 for one in (*plan.photos, *plan.ties, *plan.bases))
         + sum(one.sets - 1 for one in plan.setups),
     }
     return _priced(plan, count)
@@ -154,7 +156,9 @@ def _setups(plan):
             if other is not one
         )
         if left or plan.photos:
-            yield "drop", "setup", one.name, replace(plan, setups=left)
+            ties = tuple(tie for tie in plan.ties if one.name not in (tie.start, tie.end))
+            bases = tuple(base for base in plan.bases if one.name not in (base.setup, base.to))
+            yield "drop", "setup", one.name, replace(plan, setups=left, ties=ties, bases=bases)
     places = {one.name: one.xyz_m for one in plan.setups}
     for name, other, place in _between(plan, places):
         like = next(one for one in plan.setups if one.name == name)
@@ -216,6 +220,20 @@ def _new_tapes(plan):
                 facing=plan.facing | dict.fromkeys(ends, out),
             )  # fmt: skip
             yield "add", "tape", tie.name, after
+
+
+def _bases(plan):
+    """Bases of a stadia, each with all readings of it: from one end, or exchanged."""
+    for ends, mine in by_ends(plan.bases).items():
+        name = "-".join(ends)
+        left = tuple(one for one in plan.bases if one not in mine)
+        yield "drop", "base", name, replace(plan, bases=left)
+        again = [replace(one, readings=2 * one.readings) for one in mine]
+        if max(one.readings for one in again) <= MOST_READINGS:
+            yield "repeat", "base", name, replace(plan, bases=(*left, *again))
+    for base in new_bases(plan):
+        name = "-".join((base[0].setup, base[0].to))
+        yield "add", "base", name, replace(plan, bases=(*plan.bases, *base))
 
 
 def _control(plan):
@@ -302,6 +320,7 @@ _OF = {
     "photo_station": _stations,
     "setup": _setups,
     "tape": _tapes,
+    "base": _bases,
     "control_point": _control,
     "target_row": _rows,
     "reading": _readings,

@@ -1,6 +1,7 @@
 """The keys of plan.toml and the columns of its tables that a job does not have."""
 
 from tankcal.job.contract import columns_of
+from tankcal.job.contract.observations import ANGLE_UNITS
 from tankcal.job.fields import Field
 from tankcal.messages import message
 from tankcal.planning.fields import count, number, numbers_list
@@ -136,6 +137,7 @@ COSTS = tuple(
         "photograph",
         "setup",
         "tape",
+        "base",
         "control_point",
         "target",
         "reading",
@@ -164,6 +166,7 @@ TABLES = {
     "distances": _without_values("distances", "distance_m"),
     "height_differences": _without_values("height_differences", "dz_m"),
     "plumb_lines": _without_values("plumb_lines"),
+    "stadia": _without_values("stadia", *(f"angle_{unit}" for unit in ANGLE_UNITS)),
 }
 JOB_TABLES = (
     "courses",

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.adjust import UNCONTROLLED, noncentrality
+from tankcal.planning.bases import base_sd_m
 from tankcal.planning.model import TAPED
 from tankcal.solver.effects import covariances
 from tankcal.survey.observations import ImageCoordinates
@@ -90,6 +91,9 @@ def _of_ties(plan, observations):
         if one.table == trace.table and one.sd_m > 0:
             line = _line(one.table, (one.start, one.end), one.instrument, one.kind == "horizontal")
             lots[line].append((one.sd_m**-2, one.readings))
+    for one in plan.bases if trace.table == "distances" else ():
+        line = _line(trace.table, (one.setup, one.to), one.bar, True)
+        lots[line].append((base_sd_m(plan, one) ** -2, one.readings))
     flat, of, share, count = getattr(observations, "horizontal", False), [], [], []
     for number, (ids, group) in enumerate(zip(trace.ids, trace.group, strict=True)):
         mine = lots[_line(trace.table, ids, group, flat)]

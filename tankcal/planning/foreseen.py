@@ -7,6 +7,7 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import list_some, message
+from tankcal.pipeline.stadia_checks import check_bases
 from tankcal.pipeline.survey_warnings import SHOWN, open_questions
 from tankcal.pipeline.table import check_table
 from tankcal.planning.covariance import PredictedCovariance
@@ -26,6 +27,7 @@ def foreseen(prediction):
         *_unseen(prediction),
         *idle_ties(prediction.plan, prediction.points),
         *_uncontrolled(prediction.reliability),
+        *check_bases(prediction.measurements),
         *(replace(one, file=PLAN_FILE) if one.file == SETTINGS_FILE else one for one in of_run),
     )
 
@@ -56,22 +58,23 @@ def _unseen(prediction):
 
 
 def idle_ties(plan, points):
-    """Tapes, height differences and plumb lines with an end that is not determined.
+    """Tapes, bases, height differences and plumb lines with an end that is not determined.
 
     points  PointOutlook of all points
     """
     lost = {one.name for one in points if one.undetermined}
-    ties = plan.ties
+    ties = [(one.name, (one.start, one.end)) for one in plan.ties]
+    ties += [(one.name, (one.setup, one.to)) for one in plan.bases]
     idle = [
-        message("plan_tie_end", "{tie} ({points})", tie=one.name, points=ends)
-        for one in ties
-        if (ends := [end for end in (one.start, one.end) if end in lost])
+        message("plan_tie_end", "{tie} ({points})", tie=name, points=found)
+        for name, ends in ties
+        if (found := [end for end in ends if end in lost])
     ]
     if not idle:
         return ()
     text = message(
         "plan_ties_idle",
-        "{count} of {all} tapes, height differences and plumb lines have no effect, because "
+        "{count} of {all} tapes, bases, height differences and plumb lines have no effect, because "
         "one of their ends is not determined: {ties}",
         count=len(idle),
         all=len(ties),

@@ -43,12 +43,15 @@ class Given:
     """The sections and tables of a plan.
 
     single    {section: Entry}               repeated  {section: [Entry]}
-    tables    {name: ColumnValues or None}   control   ColumnValues of control.csv or None
+    ties      {name: ColumnValues or None} of tapes, levels and plumb lines
+    stadia    ColumnValues of stadia.csv or None
+    control   ColumnValues of control.csv or None
     is_wall   whether it is strapped, read from lines or hit, in place of targets
     """
 
     single: dict
     repeated: dict
-    tables: dict
+    ties: dict
+    stadia: object = None
     control: object = None
     is_wall: bool = False

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.geometry.rotations import angles_of
+from tankcal.planning.bases import readings_of_bases
 from tankcal.planning.model import TAPED
 from tankcal.planning.visibility import measurable
 from tankcal.survey import Nominal
@@ -39,7 +40,7 @@ def measurements_of(plan, seen):
         control=_control(plan),
         targets=targets_of(plan),
         setups=tuple(Setup(one.name, one.name, one.instrument) for one in plan.setups),
-        readings=(*_sights(plan, seen), *_ties(plan, there)),
+        readings=(*_sights(plan, seen), *_ties(plan, there), *readings_of_bases(plan, there)),
     )
 
 

@@ -115,6 +115,28 @@ class Tie:
 
 
 @dataclass(frozen=True)
+class Base:
+    """A stadia over a station, read from a set-up `readings` times: the base between them.
+
+    setup, to    names of points        bar  the stadia, as in instruments.toml
+    angle_sd_rad of one angle between the ends of the bar
+    row          of stadia.csv, for messages; None: not given there
+    """
+
+    setup: str
+    to: str
+    bar: str
+    angle_sd_rad: float
+    readings: int = 1
+    row: int | None = None
+
+    @property
+    def name(self):
+        """SETUP-TO."""
+        return f"{self.setup}-{self.to}"
+
+
+@dataclass(frozen=True)
 class Known:
     """A control point: nominal coordinates (3,), sds (3,); nan: not known, 0: held exactly."""
 
@@ -195,11 +217,14 @@ class Plan:
         Tuples of the classes above; extra are points off the wall, {name: (3,) nominal place}.
     facing : dict
         {name: (3,) unit normal} of the marks among them that face one way, as tape ends do.
+    bases : tuple of Base
+    bars : dict
+        {name: length, m} of the stadias of its instruments.
     amplitudes : Amplitudes
         How far the wall departs from a cylinder, as it is expected.
     costs : dict
-        {item: cost of one}: "photo_station", "photograph", "setup", "tape", "control_point",
-        "target", "reading".
+        {item: cost of one}: "photo_station", "photograph", "setup", "tape", "base",
+        "control_point", "target", "reading".
     folder : str
         Its name.
     given : RawJob or None
@@ -217,6 +242,8 @@ class Plan:
     facing: dict
     obstacles: tuple
     limits: Limits
+    bases: tuple[Base, ...] = ()
+    bars: dict = field(default_factory=dict)
     amplitudes: Amplitudes = field(default_factory=assumed_amplitudes)
     costs: dict = field(default_factory=dict)
     folder: str = ""

@@ -5,10 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from tankcal.job.assembly import Attached, make_job
+from tankcal.job.checking import has_rows
 from tankcal.job.checks import check_tank
 from tankcal.job.checks.survey.cameras import check_cameras
 from tankcal.job.checks.survey.files import SurveyFiles
 from tankcal.job.checks.survey.instruments import check_instruments
+from tankcal.job.checks.survey.stadia import bars_of, check_bars
 from tankcal.job.contract import KEYS
 from tankcal.job.entries import (
     ColumnValues,
@@ -89,7 +91,7 @@ def load_plan(path):
     log.stop_if_problems()
     job = _job(raw, values, tables, registers, log)
     log.stop_if_problems()
-    plan = assemble_plan(job, given, folder.resolve().name)
+    plan = assemble_plan(job, given, bars_of(registers), folder.resolve().name)
     check_plan(plan, given, raw, log)
     log.stop_if_problems()
     return replace(plan, given=_with_points(raw), warnings=tuple(log.warnings))
@@ -221,10 +223,10 @@ def _read(folder, log):
                 registers[name] = read_register_file(f"{name}.toml", register, log)
     raw = RawJob(
         folder.resolve().name, folder, PLAN_FILE, settings, sections, tables,
-        files=tuple(files), registers=registers,
+        files=tuple(files), registers=registers, is_planned=True,
     )  # fmt: skip
-    of_plan = {name: _table(name, tables.get(name), log) for name in TABLES}
-    return raw, Given(single, repeated, of_plan, is_wall=is_wall)
+    ties = {name: _table(name, tables.get(name), log) for name in TABLES}
+    return raw, Given(single, repeated, ties, ties.pop("stadia"), is_wall=is_wall)
 
 
 def _refuse_misspelt(whole, rows, text, log):
@@ -388,7 +390,7 @@ def _job_tables(raw, log):
 
 def _measured(given):
     """Tables of the plan, and a stand-in that says: image points will be measured."""
-    return given.tables | {"image_points": ColumnValues("image_points.csv", (1,), 0, {})}
+    return given.ties | {"image_points": ColumnValues("image_points.csv", (1,), 0, {})}
 
 
 def _check(raw, values, tables, registers, given, log):
@@ -397,6 +399,8 @@ def _check(raw, values, tables, registers, given, log):
     files = SurveyFiles(values, tables, registers, raw, log)
     check_cameras(files)
     check_instruments(files)
+    if has_rows(given.stadia):
+        check_bars(files, given.stadia)
     check_given(values, registers, given, raw, log)
 
 

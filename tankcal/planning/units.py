@@ -29,10 +29,11 @@ def warn_of_units(given, raw, values, log):
             for key, unit in units.items():
                 if one[key] and one[key] < TINY[unit]:
                     one.tell(log.warning, key, tiny_sd(unit, one[key]))
-    for table in given.tables.values():
-        sds = np.empty(0) if table is None else table.numbers("s_mm")
-        if (sds > 0).any() and sds[sds > 0].max() < TINY["mm"]:
-            log.warning(table.file, tiny_sd("mm", sds[sds > 0].max()), None, "s_mm")
+    for table in (*given.ties.values(), given.stadia):
+        unit = "arcsec" if table is given.stadia else "mm"
+        sds = np.empty(0) if table is None else table.numbers(f"s_{unit}")
+        if (sds > 0).any() and sds[sds > 0].max() < TINY[unit]:
+            log.warning(table.file, tiny_sd(unit, sds[sds > 0].max()), None, f"s_{unit}")
     limit = given.single["limits"]
     if (limit["relative_u"] or 0.0) > LOOSE:
         text = message(

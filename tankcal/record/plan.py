@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from tankcal.planning.bases import by_ends
 from tankcal.planning.doubtful import GroupReliability
 from tankcal.planning.prediction import PointOutlook, SectionOutlook
 from tankcal.record.plain_data import to_plain
@@ -25,13 +26,14 @@ class PlannedDatum(Saved):
     scale: bool = key("whether observations determine the scale")
 
 
-class PlannedSurvey(Saved):
+class PlannedSurvey(Saved, kw_only=True):
     """How large the survey is."""
 
     photo_stations: int = key("number")
     photographs: int = key("number")
     setups: int = key("number")
     ties: int = key("number")
+    bases: int = key("that a stadia is read over", default=0)
     control_points: int = key("number")
     targets: int = key("number")
     observations: int = key("values")
@@ -168,6 +170,7 @@ def _survey(prediction):
         photographs=len(plan.photos),
         setups=len(plan.setups),
         ties=len(plan.ties),
+        bases=len(by_ends(plan.bases)),
         control_points=len(plan.known),
         targets=len(plan.targets.names),
         observations=solution.rows,

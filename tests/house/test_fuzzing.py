@@ -135,7 +135,14 @@ def test_spoilt_workbooks_are_reported(tmp_path):
 
 @pytest.mark.parametrize(
     "name",
-    ["plan-silva", "plan-reference-line", "plan-wall-hits", "plan-tangents", "plan-liquid"],
+    [
+        "plan-silva",
+        "plan-reference-line",
+        "plan-wall-hits",
+        "plan-tangents",
+        "plan-liquid",
+        "plan-triangulation",
+    ],
 )
 def test_spoilt_plans_are_reported(tmp_path, name):
     files = text_files(EXAMPLE.parent / name)

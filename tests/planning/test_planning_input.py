@@ -1,6 +1,8 @@
 """Plans that cannot be meant: each thing told in words, with file, row and column, all at once."""
 
+import datetime
 import json
+import re
 
 import pytest
 from conftest import EXAMPLE
@@ -107,6 +109,25 @@ def test_undefined_names(changed):
         "pattern.generatrix: unknown key (did you mean generatrices?)" in one for one in lines
     )
     assert any("pattern.generatrices: missing" in line for line in lines)
+
+
+@pytest.mark.parametrize("source", ["plan-silva", "plan-tangents"])
+def test_day_of_the_survey_lies_ahead(tmp_path, source):
+    """Nobody plans what has been measured; ten years ahead are enough."""
+    for path in (EXAMPLE.parent / source).iterdir():
+        (tmp_path / path.name).write_text(path.read_text())
+    text = (tmp_path / "plan.toml").read_text()
+    day = datetime.date.today() + datetime.timedelta(days=400)
+    for date in (day, day.replace(year=day.year + 900, day=1)):
+        dated = re.sub(r"(?m)^date = \S+", f"date = {date}", text)
+        (tmp_path / "plan.toml").write_text(dated)
+        if date is day:
+            assert load_plan(tmp_path).job.survey.date == date.isoformat()
+    with pytest.raises(InputError) as error:
+        load_plan(tmp_path)
+    assert {(one.column, one.expected.code) for one in error.value.problems} == {
+        ("survey.date", "survey_date_far")
+    }
 
 
 def test_distance_or_radius(changed):

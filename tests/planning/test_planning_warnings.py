@@ -78,7 +78,7 @@ def test_a_tape_with_a_hidden_end(prediction):
     box = np.array([plan.extra["H1a"] - 0.03, plan.extra["H1a"] + 0.03])
     found = predict(replace(plan, obstacles=(Box(*box, "sign"),)))
     assert (
-        "1 of 8 tapes, height differences and plumb lines have no effect"
+        "1 of 8 tapes, bases, height differences and plumb lines have no effect"
         in lines(found.warnings)[0]
     )
     assert "H1 (H1a)" in lines(found.warnings)[0]

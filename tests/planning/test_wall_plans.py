@@ -4,13 +4,11 @@ Truth: the empty job filled in and run; jobs on generated walls that are no mode
 curvature of the likelihood over draws; monotony.
 """
 
-import csv
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import EXAMPLE
 from draws import draws
 from generated_hits import hit_job
 from generated_lines import plumbed_job
@@ -18,6 +16,7 @@ from generated_strapping import strapped_job
 from generated_tangents import tangent_job
 from generated_walls import make_wall
 from messages_told import lines
+from wall_plan_folders import HITS, LINES, TANGENTS, fill, plan_of
 
 import tankcal
 from tankcal.cli import main
@@ -41,78 +40,15 @@ from tankcal.report.planning import wall_files
 from tankcal.report.planning.wall_files import form_of_wall
 from tankcal.report.planning.wall_rows import field_tables_of_wall
 
-LINES, HITS, TANGENTS = (
-    EXAMPLE.parent / f"plan-{name}" for name in ("reference-line", "wall-hits", "tangents")
-)
 STRAPS_ALONE = (
     ('courses = ["1"]\nat_percent = [20]\nreadings = 3\n', ""),
     ("[lines]\ncount = 12\nat_percent = [20, 80]\ns_mm = 0.5\nfaces = 2\n", ""),
 )
 
 
-def plan_of(folder, source=LINES, *pairs):
-    """The folder of a shipped plan, with texts of its plan.toml replaced."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for path in source.iterdir():
-        (folder / path.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
-    text = (folder / "plan.toml").read_text(encoding="utf-8")
-    for old, new in pairs:
-        assert old in text
-        text = text.replace(old, new)
-    (folder / "plan.toml").write_text(text, encoding="utf-8")
-    return folder
-
-
 @pytest.fixture(scope="module", params=[LINES, HITS, TANGENTS], ids=["lines", "hits", "tangents"])
 def prediction(request):
     return predict(load_plan(request.param))
-
-
-def fill(folder, job, settings):
-    """Fill an empty job in with the readings of a Job, row by row."""
-    text = (folder / "job.toml").read_text(encoding="utf-8")
-    for key, value in settings.items():
-        text = "\n".join(
-            f"{key} = {value}" if line.startswith(f"{key} = ") else line
-            for line in text.splitlines()
-        )
-    (folder / "job.toml").write_text(text, encoding="utf-8")
-    values = {}
-    if job.strapping is not None:
-        values["circumferences"] = [{"reading_m": one.reading_m} for one in job.strapping.straps]
-    if job.tangents is not None:
-        rows = zip(job.tangents.direction_rad, job.tangents.zenith_rad, strict=True)
-        values["tangents"] = [
-            {"direction_deg": np.degrees(a), "zenith_deg": np.degrees(z)} for a, z in rows
-        ]
-        for one in job.measurements.readings:
-            key = {"directions": "direction_deg", "zenith_angles": "zenith_deg"}.get(one.table)
-            read = one.value if key is None else np.degrees(one.value)
-            values[one.table] = [{key or "distance_m": value} for value in read]
-    if job.lines is not None:
-        values["offsets"] = [{"offset_mm": 1000 * one.offset_m} for one in job.lines.offsets]
-    if job.hits is not None:
-        hits = job.hits
-        rows = zip(hits.direction_rad, hits.zenith_rad, hits.distance_m, strict=True)
-        values["wall_hits"] = [
-            {"direction_deg": np.degrees(a), "zenith_deg": np.degrees(z), "distance_m": d}
-            for a, z, d in rows
-        ]
-    if job.hits is not None:
-        values["control_readings"] = [
-            {"direction_deg": np.degrees(one.direction_rad), "time": f"2026-07-01T09:{k:02d}"}
-            for k, one in enumerate(job.hits.control)
-        ]
-    for name, read in values.items():
-        path = folder / f"{name}.csv"
-        lines = [one for one in path.read_text(encoding="utf-8").splitlines() if one[0] != "#"]
-        headings, *rows = csv.reader(lines)
-        assert len(rows) == len(read)
-        for row, one in zip(rows, read, strict=True):
-            for key, value in one.items():
-                row[headings.index(key)] = value if key == "time" else repr(float(value))
-        with open(path, "w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows([headings, *rows])
 
 
 @pytest.mark.slow

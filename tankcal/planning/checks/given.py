@@ -9,14 +9,15 @@ from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.units import warn_of_units
 
 UNFIT = {  # kinds of instruments that cannot be meant
-    "setup_rings": ("tape", "level"),
-    "tapes": ("total_station", "theodolite", "level"),
+    "setup_rings": ("tape", "level", "stadia"),
+    "tapes": ("total_station", "theodolite", "level", "stadia"),
 }
 _NAMED = {
     "tape": message("plan_named_tape", "tape"),
     "level": message("plan_named_level", "level"),
     "total_station": message("plan_named_total_station", "total station"),
     "theodolite": message("plan_named_theodolite", "theodolite"),
+    "stadia": message("plan_named_stadia", "stadia"),
 }
 
 
@@ -139,7 +140,7 @@ def _check_tapes(given, log):
 
 def _check_tables(given, log):
     """Ties between two points, control points that stand there once, in one frame."""
-    for table in given.tables.values():
+    for table in given.ties.values():
         if table is None:
             continue
         for row, start, end in zip(table.rows, table.of("from"), table.of("to"), strict=True):

@@ -5,6 +5,7 @@ import numpy as np
 from tankcal.job.checking import is_not_given, tell
 from tankcal.job.tables import Log, nearest
 from tankcal.messages import join_with_and, list_some, message
+from tankcal.planning.checks.bases import check_bases
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.model import Pillar
 from tankcal.planning.patterns import TOUCH_M, plate_m
@@ -22,7 +23,7 @@ OUT_OF_PLUMB_M = 0.5  # between the ends of a plumb line, in plan
 def check_tied(plan, given, log):
     """Every end of a tie is a point, no tape runs through the tank, control is where it stands."""
     points = plan.points
-    for table in given.tables.values():
+    for table in given.ties.values():
         for end in ("from", "to") if table is not None else ():
             for row, name in zip(table.rows, table.of(end), strict=True):
                 if name not in points:
@@ -49,7 +50,7 @@ def _rows(plan, table):
 
 
 def _check_distances(plan, given, log):
-    for row, ends, xyz in _rows(plan, given.tables["distances"]):
+    for row, ends, xyz in _rows(plan, given.ties["distances"]):
         if why := _through(plan, ends, xyz):
             log.problem("distances.csv", why, row, "to")
     for entry in given.repeated["tapes"]:
@@ -85,7 +86,7 @@ def _through(plan, ends, xyz):
 
 
 def _check_plumb_lines(plan, given, log):
-    for row, (one, other), xyz in _rows(plan, given.tables["plumb_lines"]):
+    for row, (one, other), xyz in _rows(plan, given.ties["plumb_lines"]):
         off = np.hypot(*(xyz[1, :2] - xyz[0, :2]))
         if off > OUT_OF_PLUMB_M:
             expected = message(
@@ -256,6 +257,7 @@ def check_plan(plan, given, raw, log):
     _check_stations(plan, (*plan.photos, *plan.setups), log)
     _check_fixed_photo(plan, raw, log)
     check_tied(plan, given, log)
+    check_bases(plan, given, log)
     warn_of_places(plan, given, log)
 
 

@@ -10,15 +10,19 @@ import numpy as np
 from tankcal.job.checks.tangents import FEWEST_SETUPS
 from tankcal.planning.wall.filling_changes import changes_of_runs
 from tankcal.planning.wall.model import USUAL_AT, PlannedStrap, even_radius_m
-from tankcal.planning.wall.reading import changed, least_ring_m
+from tankcal.planning.wall.reading import changed, least_ring_m, lengths_of_bars
 
 OF_FILLING = ("step", "top_of_run", "half_steps", "empty_start", "run")
-SEARCHED = ("strap", "line", "face", "level", "hit", "setup", "station", "reading", *OF_FILLING)
+SEARCHED = (
+    *("strap", "line", "face", "level", "hit", "setup", "station", "bar", "ranging", "reading"),
+    *OF_FILLING,
+)
 WALL_ITEMS = (  # the last are no part of a design
     *(*SEARCHED, "accuracy", "traverse", "certificate", "meter", "batches"),
 )
-MORE_LINES = 4
-BETTER = ("u_scale_ppm", "u_offset_mm", "u_collimation_arcsec", "u_incidence_mm")
+NUMBERED = ("level", "station")  # items that are named by a number, with a decimal point
+MORE_LINES, BAR_SD_ARCSEC = 4, 1.0  # of what is added
+BETTER = ("u_scale_ppm", "u_offset_mm", "u_collimation_arcsec", "u_incidence_mm", "u_mm")
 MOST_FACES, MOST_READINGS, FEWEST_LINES, FEWEST_HITS = 2, 20, 4, 5
 
 
@@ -54,6 +58,7 @@ def wall_count(plan):
         "strap": len(design.straps),
         "line": 0 if lines is None else lines.count,
         "setup": sum(one.setups for one in design.hits) + (0 if ring is None else ring.stations),
+        "base": 0 if ring is None or ring.bar is None else 2 * ring.stations,
         "reading": read,
         "run": len(design.runs),
         "batch": sum(one.batches for one in design.runs),
@@ -175,8 +180,17 @@ def _tangents(plan):
     for action, name, at in _levels(ring.at_percent):
         yield action, "level", name, made(at_percent=at)
     yield "repeat", "accuracy", "tangents", made(sd_arcsec=ring.sd_arcsec / 2)
-    finer = tuple(one / 2 for one in ring.traverse)
-    yield "repeat", "traverse", "traverse", made(traverse=finer)
+    s_mm, s_arcsec = ring.traverse
+    finer = (None if s_mm is None else s_mm / 2), s_arcsec / 2
+    bar = ring.bar and (ring.bar[0], ring.bar[1] / 2)
+    yield "repeat", "traverse", "traverse", made(traverse=finer, bar=bar)
+    bars = tuple(lengths_of_bars(plan.given))
+    if ring.bar is None:
+        for name in bars:
+            yield "add", "bar", name, made(bar=(name, BAR_SD_ARCSEC))
+    elif s_mm is not None:
+        yield "drop", "bar", ring.bar[0] or bars[0], made(bar=None)
+        yield "drop", "ranging", "", made(traverse=(None, s_arcsec))
     yield from _first_straps(plan)
 
 

@@ -115,12 +115,11 @@ TRAVERSE = (
         "s_mm",
         message(
             "plan_note_traverse_mm",
-            "standard deviation of a distance between stations, millimetres",
+            "standard deviation of a distance between stations, millimetres; blank: none",
         ),
         0,
         1e3,
-        True,
-        True,
+        above_low=True,
     ),
     number(
         "s_arcsec",
@@ -133,6 +132,15 @@ TRAVERSE = (
         True,
         True,
     ),
+    number(
+        "s_bar_arcsec",
+        "standard deviation of an angle to the ends of a stadia over the next station, seconds of"
+        " arc; blank: none",
+        0,
+        1e4,
+        above_low=True,
+    ),
+    Field("bar", "name", "that stadia, as in instruments.toml; blank: the only one there"),
 )
 RUNS = (
     Field("meter", "name", "as in meters.toml; blank: the only one there"),

@@ -15,7 +15,9 @@ from tankcal.job.checks.strapping import MOST_STRAPS
 from tankcal.job.checks.tangents import MOST_TANGENTS
 from tankcal.job.tables import Table
 from tankcal.planning.wall.filling import rows_of_runs
+from tankcal.survey.stadia import angle_of_distance_rad
 
+USUAL_BAR_M = 2.0  # where nobody describes it, which the job tells
 STEEPEST = np.radians(55.0)  # incidence in plan, of a set-up that says nothing of what it sees
 TIE_HEIGHTS_M = (0.4, 1.4, 2.4)  # above the instrument's foot: of targets that set-ups share
 FIRST_ROUND = datetime.datetime(2000, 1, 1)  # of control targets: only what lies between counts
@@ -28,10 +30,12 @@ class Foreseen:
     design  Design              courses  ((name, height_m), ...) from the bottom up
     radius_m  nominal           bottom_m  z of the bottom     zero_m  of the table above it
     holds     function of a dip that gives m3, roughly; None: nothing is filled in
+    bars      {name: length, m} of stadias
     """
 
-    def __init__(self, design, courses, radius_m, bottom_m, zero_m, holds=None):
+    def __init__(self, design, courses, radius_m, bottom_m, zero_m, holds=None, bars=None):
         self.design, self.radius_m, self.holds = design, radius_m, holds
+        self.bars = bars or {}
         self.bottom_m, self.zero_m = bottom_m, zero_m
         self.foot, foot = {}, 0.0
         for name, height in courses:
@@ -208,7 +212,9 @@ class Foreseen:
         ring, stands = self.design.tangents, list(self._stands())
         s_mm, s_arcsec = ring.traverse
         kinds = _kinds_of_sights(s_mm, s_arcsec)
+        kinds = kinds if s_mm is not None else kinds[:-1]
         found = {"setups": [], "control": [], **{table: [] for table, _, _ in kinds}}
+        found |= {} if ring.bar is None else {"stadia": []}
         for k, (name, there) in enumerate(stands):
             found["setups"].append(
                 {
@@ -226,7 +232,16 @@ class Foreseen:
                 for table, key, sd in kinds:
                     high = {"target_height_m": ring.height_m}
                     found[table].append(row | {key: read[key]} | sd | high)
+                if ring.bar is not None:
+                    found["stadia"].append(row | self._bar_sight(there, stands[beside][1]))
         return found
+
+    def _bar_sight(self, there, beside):
+        """{column: value} of the angle to the ends of the bar over the next station."""
+        name, sd = self.design.tangents.bar
+        usual = next(iter(self.bars.values()), USUAL_BAR_M)
+        angle = angle_of_distance_rad(np.hypot(*(beside - there)[:2]), self.bars.get(name, usual))
+        return {"bar": name, "angle_deg": float(np.degrees(angle)), "s_arcsec": sd}
 
     def _ties(self):
         """Readings of targets that stand between neighbouring set-ups of a ring."""

@@ -93,7 +93,9 @@ class PlannedTangents:
 
     radius_m   of its ring about the axis      height_m  of the instrument above the bottom
     sd_arcsec  of a sight to a limb            readings  how often each limb is sighted
-    traverse   (s_mm of a distance, s_arcsec of an angle) between neighbouring stations
+    traverse   (s_mm of a distance, s_arcsec of an angle) between neighbouring stations; s_mm None:
+               no distances
+    bar        (its name, s_arcsec of an angle to its ends) of a stadia over either one; None: none
     """
 
     stations: int
@@ -101,6 +103,7 @@ class PlannedTangents:
     at_percent: tuple
     sd_arcsec: float
     traverse: tuple
+    bar: tuple | None = None
     start_deg: float = 0.0
     height_m: float = 1.6
     readings: int = 1
@@ -194,7 +197,7 @@ class WallPlan:
     amplitudes : Amplitudes
         How far the wall departs from a cylinder, as it is expected.
     costs : dict
-        {item: cost of one}: "strap", "line", "setup", "reading", "run", "batch".
+        {item: cost of one}: "strap", "line", "setup", "base", "reading", "run", "batch".
     dips_m : tuple of float
         Whose volumes and differences are listed; (): those of the runs, and of the full tank.
     expected_run : float or None

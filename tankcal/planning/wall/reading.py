@@ -13,6 +13,7 @@ from tankcal.job.checks.hits import FEWEST_HITS, MOST_HITS, too_many_hits
 from tankcal.job.checks.lines import MOST_OFFSETS, too_many_offsets
 from tankcal.job.checks.sized_volumes import volume_by_sizes
 from tankcal.job.checks.strapping import MOST_STRAPS, too_many_straps
+from tankcal.job.checks.survey.stadia import is_bar
 from tankcal.job.checks.tangents import FEWEST_SETUPS, MOST_TANGENTS, too_many_tangents
 from tankcal.job.tables import Log, Value
 from tankcal.messages import message
@@ -149,10 +150,15 @@ def _check_lines_and_ties(given, log):
         log.problem(PLAN_FILE, expected, ties.row, "setup_ties")
     _check_control(given, log)
     if ties.filled:
-        for key in ("s_mm", "s_arcsec"):
-            if key not in ties.filled:
-                expected = message("plan_number_missing", "missing; expected a number above 0")
-                ties.tell(log.problem, key, expected)
+        _need(ties, ("s_mm", "s_arcsec"), log)
+
+
+def _need(entry, keys, log):
+    """Numbers without which a section says nothing."""
+    for key in keys:
+        if key not in entry.filled:
+            expected = message("plan_number_missing", "missing; expected a number above 0")
+            entry.tell(log.problem, key, expected)
 
 
 def _check_control(given, log):
@@ -192,6 +198,15 @@ def _check_tangents(given, nominal_m, log):
             " stations: they tie the sights",
         )
         log.problem(PLAN_FILE, expected, ring.row, "tangents")
+    elif not traverse.filled & {"s_mm", "s_bar_arcsec"}:
+        expected = message(
+            "plan_traverse_without_scale",
+            "no distance is measured; expected s_mm, or s_bar_arcsec of a stadia: nothing else"
+            " tells the scale",
+        )
+        traverse.tell(log.problem, "s_mm", expected)
+    elif "bar" in traverse.filled:
+        _need(traverse, ("s_bar_arcsec",), log)
     for name in ("lines", "hits"):
         other = given.single.get(name) or next(iter(given.repeated.get(name, ())), None)
         if other is not None and other.filled:
@@ -346,11 +361,17 @@ def _tangents(entry, traverse):
         at_percent=_at(entry),
         sd_arcsec=entry["s_arcsec"],
         traverse=(traverse["s_mm"], traverse["s_arcsec"]),
+        bar=_bar(traverse),
         start_deg=entry["start_azimuth_deg"] or 0.0,
         height_m=USUAL_HEIGHT_M if entry["height_m"] is None else entry["height_m"],
         readings=int(entry["readings"] or 1),
         instrument=entry["instrument"],
     )
+
+
+def _bar(traverse):
+    sd = traverse["s_bar_arcsec"]
+    return None if sd is None else (traverse["bar"], sd)
 
 
 def wall_plan_of(raw, values, tables, given, limits, folder):
@@ -404,7 +425,19 @@ def changed(plan, design=None, raw=None):
 
 def tables_of(plan):
     """{name: Table} of what will be read, whatever stands as its value."""
-    return Foreseen(plan.design, *_tank_of(plan)).tables()
+    return Foreseen(plan.design, *_tank_of(plan), lengths_of_bars(plan.given)).tables()
+
+
+def lengths_of_bars(raw):
+    """{name: length, m} of the stadias of a RawJob whose instruments.toml tells it."""
+    register = raw.registers.get("instruments")
+    found = {}
+    for name, entry in {} if register is None else register.entries.items():
+        given = {key: one.raw for key, one in entry.items()}
+        length = given.get("length_m")
+        if is_bar(str(given.get("kind"))) and isinstance(length, int | float) and length > 0:
+            found[name] = float(length)
+    return found
 
 
 def _tank_of(plan):
@@ -424,7 +457,7 @@ def job_of_design(raw, design, tank, expected, rows=None):
     expected  amplitudes of the wall, and the run effect, as `with_nominal_readings` takes them
     rows      {section: row of plan.toml}, for what is told
     """
-    made = Foreseen(design, *tank).tables()
+    made = Foreseen(design, *tank, lengths_of_bars(raw)).tables()
     settings = dict(raw.settings)
     datum = datum_of(design)
     if datum is not None:

@@ -25,6 +25,7 @@ OF_TRAVERSE = {  # where limbs are sighted from its stations
     "directions.csv": "traverse",
     "zenith_angles.csv": "traverse",
     "slope_distances.csv": "traverse",
+    "stadia.csv": "traverse",
 }
 
 

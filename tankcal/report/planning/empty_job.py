@@ -78,7 +78,7 @@ def form_of(prediction):
     used = [name for name, found in _tables(prediction).items() if found]
     return FilledForm(
         kind="vertical",
-        survey="photos" if plan.photos else "total-station",
+        survey=_survey(plan),
         language=plan.job.table.language or DEFAULT,
         settings={key: text for key, text in settings.items() if key not in MEASURED},
         given={name: as_given(raw.tables[name]) for name in AS_GIVEN if name in raw.tables}
@@ -87,6 +87,13 @@ def form_of(prediction):
         to_fill=tuple(key for key in settings if key in MEASURED),
         more=tuple(name for name in COLUMNS if name in used),
     )
+
+
+def _survey(plan):
+    """The kind of survey, as `tankcal new` calls it."""
+    if plan.photos:
+        return "photos"
+    return "triangulation" if plan.bases else "total-station"
 
 
 def _tables(prediction):
@@ -101,6 +108,7 @@ def _tables(prediction):
             for one in plan.setups
         ),
         **{table: _ties(plan, table) for table in TAPED},
+        "stadia": _bases(plan),
         **_sights(prediction),
     }
 
@@ -148,6 +156,16 @@ def _ties(plan, table):
         row = {"from": one.start, "to": one.end, "s_mm": _mm(one.sd_m)}
         if table == "distances":
             row |= {"kind": one.kind, "instrument": one.instrument or ""}
+        rows += [row] * one.readings
+    return tuple(rows)
+
+
+def _bases(plan):
+    """Rows of stadia.csv, one for each reading."""
+    rows = []
+    for one in plan.bases:
+        row = {"setup": one.setup, "to": one.to, "bar": one.bar}
+        row |= {"s_arcsec": short(ARCSEC * degrees(one.angle_sd_rad), 6)}
         rows += [row] * one.readings
     return tuple(rows)
 

@@ -2,6 +2,7 @@
 
 from math import ceil
 
+from tankcal.planning.bases import by_ends
 from tankcal.report import blocks
 from tankcal.report.planning import sketches
 from tankcal.report.planning.rows import lost_ties
@@ -38,6 +39,7 @@ def _overview(paper, tables):
         "setups": len(plan.setups),
         "tapes": len(plan.ties),
         "lost_ties": len(lost_ties(paper.prediction)),
+        "bases": len(by_ends(plan.bases)),
         "control_points": len(plan.known),
     }
     shown = [
@@ -109,6 +111,9 @@ def _readings(paper, tables):
         found.append(paper.paragraph("ties"))
         if any(one.table == "plumb_lines" for one in paper.plan.ties):
             found.append(paper.paragraph("plumb_lines"))
+    if "bases" in tables:
+        found += [paper.heading("bases"), paper.table("bases", *tables["bases"])]
+        found.append(paper.paragraph("bases"))
     if "control" in tables:
         found += [paper.heading("control"), paper.table("control", *tables["control"])]
     return found

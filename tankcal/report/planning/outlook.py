@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tankcal.planning.bases import by_ends
 from tankcal.planning.changes import cost_of
 from tankcal.planning.simulations import BLUNDER_SDS
 from tankcal.report import blocks
@@ -73,6 +74,7 @@ def _facts(paper):
                 ("setups", _count(paper, len(plan.setups))),
                 ("tapes", _count(paper, len(plan.ties))),
                 ("lost_ties", _count(paper, len(lost_ties(found)))),
+                ("bases", _count(paper, len(by_ends(plan.bases)))),
                 ("control_points", _count(paper, len(plan.known))),
                 ("targets", _count(paper, len(plan.targets.names))),
                 ("unseen_targets", _count(paper, unseen_targets(found))),

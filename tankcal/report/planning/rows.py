@@ -7,6 +7,7 @@ import numpy as np
 
 from tankcal.camera.model import PARAMETERS
 from tankcal.geometry.rotations import view_of_rotation
+from tankcal.planning.bases import angle_of_base_rad, base_m
 from tankcal.planning.places import joints_m, place_of
 from tankcal.planning.wall.model import WallPlan
 
@@ -153,6 +154,25 @@ def ties(prediction):
     return found
 
 
+def bases(prediction):
+    """Angles to the ends of a stadia, a row for each reading."""
+    plan, lost = prediction.plan, lost_points(prediction)
+    return [
+        {
+            "setup": one.setup,
+            "to": one.to,
+            "bar": one.bar,
+            "expected_m": base_m(plan, one),
+            "expected_rad": angle_of_base_rad(plan, one),
+            "angle_sd_rad": one.angle_sd_rad,
+            "reading": number,
+            "value": "unseen_end" if {one.setup, one.to} & lost else None,
+        }
+        for one in plan.bases
+        for number in range(1, one.readings + 1)
+    ]
+
+
 def _kind(tie, rise):
     if tie.table != "distances":
         return tie.table
@@ -205,7 +225,7 @@ def cameras(plan):
 
 def instruments(plan):
     """Instruments that measure something, with their certificates."""
-    used = {one.instrument for one in (*plan.ties, *plan.setups)}
+    used = {one.instrument for one in (*plan.ties, *plan.setups)} | {one.bar for one in plan.bases}
     return [
         {
             "instrument": one.name,

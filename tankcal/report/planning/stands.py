@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from tankcal.pipeline.plots import GREY, INK, PALE, WIDTH, round_factor, styled
+from tankcal.planning.bases import by_ends
 from tankcal.planning.model import TAPED, Box
 from tankcal.planning.places import reference_rad
 from tankcal.report.planning.sketches import (
@@ -38,6 +39,7 @@ def stands(paper):
     _obstacles(ax, plan)
     for table in TAPED:
         _ties(ax, paper, table)
+    _bases(ax, paper)
     _marks(ax, paper)
     _views(ax, paper)
     photos = {one.station: one.xyz_m for one in plan.photos}
@@ -129,6 +131,15 @@ def _ties(ax, paper, table):
         label = None
         if own_name(plan, one):
             _beside(ax, plan, ends.mean(axis=0), one.name, 0.07, OCHRE)
+
+
+def _bases(ax, paper):
+    """Lines between the stations of each base of a stadia."""
+    plan, label = paper.plan, paper.word("legend.bases")
+    for ends in by_ends(plan.bases):
+        line = np.array([plan.points[name][:2] for name in ends])
+        ax.plot(*line.T, linestyle="-.", color=OCHRE, linewidth=1.2, zorder=2, label=label)
+        label = None
 
 
 def _marks(ax, paper):

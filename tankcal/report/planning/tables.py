@@ -32,6 +32,13 @@ TIES = (
     Column("instrument"), Column("reading", decimals=0),
     Column("value", nothing="_" * 14, words="marks"), Column("temperature", nothing="_" * 6),
 )  # fmt: skip
+BASES = (
+    Column("setup"), Column("to"), Column("bar"),
+    Column("expected_m", "m", decimals=2, heading="base"),
+    Column("expected_rad", "rad deg", decimals=3, heading="expected_m"),
+    Column("angle_sd_rad", "rad arcsec", decimals=1, heading="sd_m"),
+    Column("reading", decimals=0), Column("value", nothing="_" * 14, words="marks"),
+)  # fmt: skip
 CONTROL = (
     POINT, ARC, OFF, HEIGHT, Column("sx_m", "mm", decimals=1), Column("sy_m", "mm", decimals=1),
     Column("sz_m", "mm", decimals=1),
@@ -60,6 +67,7 @@ def field_tables(prediction):
         "photographs": (rows.photographs(prediction), PHOTOGRAPHS),
         "setups": (rows.setups(prediction), SETUPS),
         "ties": (rows.ties(prediction), TIES),
+        "bases": (rows.bases(prediction), BASES),
         "control": (rows.control(plan), CONTROL),
         "cameras": (rows.cameras(plan), CAMERAS),
         "instruments": (rows.instruments(plan), INSTRUMENTS),

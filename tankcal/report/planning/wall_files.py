@@ -13,7 +13,9 @@ OF_BATCHES = (
     *("volume_m3", "dip_m", "meter_temperature_c", "tank_temperature_c"),
     "shell_temperature_c",
 )
-READ = ("reading_m", "offset_mm", "direction_deg", "zenith_deg", "distance_m", "time")  # left blank
+READ = (  # left blank
+    *("reading_m", "offset_mm", "direction_deg", "zenith_deg", "distance_m", "angle_deg", "time"),
+)
 
 
 def write_wall(paper, folder, fingerprints):

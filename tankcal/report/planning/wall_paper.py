@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.planning.changes import cost_of
+from tankcal.planning.wall.changes import NUMBERED
 from tankcal.record.wall_plan import survey_of
 from tankcal.report import blocks
 from tankcal.report.plain import Column
@@ -31,7 +32,10 @@ class WallPaper(PlanPaper):
         code = f"{change.action}_wall_{change.item}"
         if change.name in OF_ALL:
             code += f"_of_{change.name}"
-        return self.word(f"changes.{code}", name=change.name)
+        name = change.name
+        if change.item in NUMBERED:
+            name = name.replace(".", self.marks.decimal)
+        return self.word(f"changes.{code}", name=name)
 
 
 def wall_outlook(paper):
@@ -105,12 +109,14 @@ def wall_sheets(paper):
         "hit_setups": "hits",
         "control_targets": "control_targets",
         "tangent_stations": "tangents",
+        "bases": "bases",
     }
     found = [*paper.head("field_sheets"), paper.facts(_counts(paper))]
     found += paper.warnings(paper.plan.warnings)
     for name, one in tables.items():
         if name in heads:
-            found += [paper.heading(heads[name]), paper.paragraph(f"wall_{heads[name]}")]
+            about = name if name == "bases" else f"wall_{heads[name]}"
+            found += [paper.heading(heads[name]), paper.paragraph(about)]
         found.append(paper.table(name, *one, across=2 if name in NARROW else None))
     return [
         *found,

@@ -5,8 +5,10 @@ import datetime
 import numpy as np
 
 from tankcal.planning.wall.nominal_readings import place_stations
-from tankcal.planning.wall.reading import tables_of
+from tankcal.planning.wall.reading import lengths_of_bars, tables_of
 from tankcal.report.plain import Column
+from tankcal.report.planning.tables import BASES
+from tankcal.survey.stadia import angle_of_distance_rad
 
 HEIGHT = Column("height_m", "m", decimals=3)
 LEVEL = Column("level_m", "m", decimals=3)
@@ -64,7 +66,8 @@ def field_tables_of_wall(plan):
         "shared_targets": (_ties(plan), TIES),
         "control_targets": (_control(plan), CONTROL),
         "tangent_stations": (_stands(plan), STANDS),
-        "traverse": (_traverse(plan), TRAVERSE),
+        "traverse": (_traverse(plan), _columns_of_traverse(plan)),
+        "bases": (_bases(plan), BASES),
         "tangents": (_tangents(plan), TANGENTS),
     }
     return {name: table for name, table in found.items() if table[0]}
@@ -195,13 +198,47 @@ def _stands(plan):
     ]
 
 
+def _of_traverse(plan):
+    """{table: Readings} between neighbouring stations, all in the same order."""
+    return {one.table: one for one in plan.job.measurements.readings}
+
+
 def _traverse(plan):
     """Each sight between neighbouring stations."""
     if plan.job.tangents is None:
         return []
-    ranged = next(one for one in plan.job.measurements.readings if one.table == "slope_distances")
-    pairs = zip(ranged.setup, ranged.end, ranged.value, strict=True)
+    given = _of_traverse(plan)
+    sighted, ranged = given["directions"], given.get("slope_distances") or given["distances"]
+    pairs = zip(sighted.setup, sighted.end, ranged.value, strict=True)
     return [{"setup": name, "to": end, "expected_m": float(m)} for name, end, m in pairs]
+
+
+def _columns_of_traverse(plan):
+    """Those of TRAVERSE; without distances where a stadia alone tells them."""
+    ring = plan.design.tangents
+    is_ranged = ring is not None and ring.traverse[0] is not None
+    return tuple(one for one in TRAVERSE if is_ranged or one.key != "distance")
+
+
+def _bases(plan):
+    """Each angle to the ends of a stadia over a neighbouring station."""
+    ring = plan.design.tangents
+    if ring is None or ring.bar is None:
+        return []
+    read, lengths = _of_traverse(plan)["distances"], lengths_of_bars(plan.given)
+    pairs = zip(_traverse(plan), read.value, read.instrument, strict=True)
+    return [
+        {
+            "setup": row["setup"],
+            "to": row["to"],
+            "bar": bar,
+            "expected_m": float(base),
+            "expected_rad": float(angle_of_distance_rad(base, lengths[bar])),
+            "angle_sd_rad": np.radians(ring.bar[1] / 3600),
+            "reading": 1,
+        }
+        for row, base, bar in pairs
+    ]
 
 
 def _tangents(plan):

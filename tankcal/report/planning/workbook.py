@@ -14,7 +14,9 @@ from tankcal.report.workbook.book import Book, about_saved
 from tankcal.report.workbook.look import Column as Cells
 from tankcal.report.workbook.tables import HEAD_ROW, set_widths
 
-ONE_A_SHEET = ("targets", "others", "stations", "photographs", "setups", "ties", "control")
+ONE_A_SHEET = (
+    *("targets", "others", "stations", "photographs", "setups", "ties", "bases", "control"),
+)
 EQUIPMENT = ("cameras", "instruments")
 SKETCHES = {"wall": sketches.wall, "stands": stands}
 FIRST = {"targets": ("point", "line", "row")}  # columns of a sheet before those of the paper

@@ -17,6 +17,7 @@ from tankcal.job.plausibility import (
     RIM_MISS_M,
     SLOPE_UP,
     TOP_MISS_M,
+    YEARS_PLANNED,
     reference_doubt,
 )
 from tankcal.messages import message
@@ -25,12 +26,24 @@ from tankcal.messages import message
 
 
 def check_dates(values, raw, log):
-    """A survey lies in the past, and not before tanks were calibrated; an issue is near."""
+    """A survey lies in the past, and not before tanks were calibrated; an issue is near.
+
+    One that is planned may lie ahead.
+    """
     today = datetime.date.today()
     surveyed = _day(values["survey"]["date"])
-    if surveyed is not None and not (
-        surveyed.year >= FIRST_YEAR and (surveyed - today).days <= DAYS_AHEAD
-    ):
+    is_late = surveyed is not None and (surveyed - today).days > DAYS_AHEAD
+    if raw.is_planned and is_late:
+        if surveyed.year > today.year + YEARS_PLANNED:
+            text = message(
+                "survey_date_far",
+                "found {found}; expected a day within {years} years of today, {today}",
+                found=surveyed.isoformat(),
+                years=YEARS_PLANNED,
+                today=today.isoformat(),
+            )
+            tell(log.problem, raw, "survey", "date", text)
+    elif is_late or (surveyed is not None and surveyed.year < FIRST_YEAR):
         text = message(
             "survey_date_impossible",
             "found {found}; expected a day from the year {first} to today, {today}",

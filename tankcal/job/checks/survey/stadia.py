@@ -24,33 +24,21 @@ def bars_used(table, bars):
     return [usual if name is None else name for name in table.of("bar")]
 
 
-def check_stadia(files):
-    """All readings of stadias, and the bars that they name."""
-    table, bars = files.tables["stadia"], bars_of(files.registers)
+def check_bars(files, table):
+    """The stadias of instruments.toml, and that readings of stadias name none but these."""
+    bars = bars_of(files.registers)
     for name, given in bars.items():
         for key in ("length_m", "u_mm"):
-            if given[key] is None and has_rows(table):
+            if given[key] is None:
                 expected = message(
                     "bar_not_described",
                     "missing; expected it of a stadia: distances are read against its length",
                 )
                 files.tell_key(files.log.problem, "instruments", name, key, expected)
-    if not has_rows(table):
-        return
-    setups = files.tables["setups"]
-    defined = () if setups is None else dict.fromkeys(setups.of("setup"))
-    refuse_undefined(files, table, "setup", defined, "setups")
-    check_angle(files, table, "angle")
     if files.raw.registers.get("instruments", 0) is None:  # unreadable, which is told
         return
-    used = bars_used(table, bars)
-    stations = {}
-    if setups is not None:
-        stations = dict(zip(setups.of("setup"), setups.of("station"), strict=True))
     told = set()
-    for row, setup, to, bar in zip(
-        table.rows, table.of("setup"), table.of("to"), used, strict=True
-    ):
+    for row, bar in zip(table.rows, bars_used(table, bars), strict=True):
         if bar not in bars and bar not in told:
             told.add(bar)
             expected = message(
@@ -60,10 +48,31 @@ def check_stadia(files):
                 file=files.raw.file_of("instruments"),
             )
             files.log.problem(table.file, expected, row, "bar")
+
+
+def check_stadia(files):
+    """All readings of stadias, and the bars that they name."""
+    table = files.tables["stadia"]
+    if not has_rows(table):
+        return
+    setups = files.tables["setups"]
+    defined = () if setups is None else dict.fromkeys(setups.of("setup"))
+    refuse_undefined(files, table, "setup", defined, "setups")
+    check_angle(files, table, "angle")
+    check_bars(files, table)
+    stations = {}
+    if setups is not None:
+        stations = dict(zip(setups.of("setup"), setups.of("station"), strict=True))
+    for row, setup, to in zip(table.rows, table.of("setup"), table.of("to"), strict=True):
         if to is not None and stations.get(setup) == to:
-            expected = message(
-                "stadia_at_itself",
-                "found station {to!r} of the set-up itself; expected another one",
-                to=to,
-            )
-            files.log.problem(table.file, expected, row, "to")
+            refuse_itself(files.log, table, row, to)
+
+
+def refuse_itself(log, table, row, to):
+    """A problem for a bar that stands over the station that reads it."""
+    expected = message(
+        "stadia_at_itself",
+        "found station {to!r} of the set-up itself; expected another one",
+        to=to,
+    )
+    log.problem(table.file, expected, row, "to")

@@ -1,0 +1,101 @@
+"""Bases of a plan: a stadia over a station, read from another; what is read and how well."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tankcal.job.checking import has_rows
+from tankcal.job.checks.survey.stadia import bars_used
+from tankcal.planning.model import Base
+from tankcal.planning.patterns import ARCSEC
+from tankcal.survey.measurements import Readings
+from tankcal.survey.stadia import angle_of_distance_rad, distance_sd_m
+
+STADIA_FILE = "stadia.csv"
+NEW_SD_RAD = ARCSEC  # of a base that is added where the plan has none to follow
+
+
+def bases_of(table, bars):
+    """The `Base`s of a plan's stadia.csv, row by row; () of none.
+
+    table  ColumnValues or None      bars  {name: of it} of the stadias there are
+    """
+    if not has_rows(table):
+        return ()
+    columns = (table.of("setup"), table.of("to"), bars_used(table, bars))
+    columns += table.of("s_arcsec"), table.of("readings"), table.rows
+    return tuple(
+        Base(setup, to, bar, sd * ARCSEC, int(readings or 1), row)
+        for setup, to, bar, sd, readings, row in zip(*columns, strict=True)
+    )
+
+
+def base_m(plan, one):
+    """Horizontal distance, m, that a Base of a Plan has at the nominal places."""
+    points = plan.points
+    return float(np.hypot(*(points[one.to] - points[one.setup])[:2]))
+
+
+def angle_of_base_rad(plan, one):
+    """Angle, rad, under which the bar of a Base will be seen."""
+    return float(angle_of_distance_rad(base_m(plan, one), plan.bars[one.bar]))
+
+
+def base_sd_m(plan, one):
+    """Standard deviation, m, of the distance that one reading of a Base tells."""
+    return float(distance_sd_m(angle_of_base_rad(plan, one), plan.bars[one.bar], one.angle_sd_rad))
+
+
+def readings_of_bases(plan, there):
+    """The `Readings` of the bases between points that are `there`, without values; () of none.
+
+    Readings that are repeated stand there once, with the standard deviation of their mean.
+    """
+    bases = [one for one in plan.bases if {one.setup, one.to} <= there]
+    if not bases:
+        return ()
+    n = len(bases)
+    return (
+        Readings(
+            table="distances",
+            value=np.zeros(n),
+            sd=np.array([base_sd_m(plan, one) / np.sqrt(one.readings) for one in bases]),
+            start=tuple(one.setup for one in bases),
+            end=tuple(one.to for one in bases),
+            check=np.zeros(n, dtype=bool),
+            instrument=tuple(one.bar for one in bases),
+            horizontal=np.ones(n, dtype=bool),
+            temperature_c=np.full(n, np.nan),
+            rows=tuple(one.row for one in bases),
+            sheet=STADIA_FILE,
+        ),
+    )
+
+
+def by_ends(bases):
+    """{names of both ends: its `Base`s}: read from one of them, from the other, or again."""
+    found = {}
+    for one in bases:
+        ends = (one.setup, one.to)
+        found.setdefault(ends[::-1] if ends[::-1] in found else ends, []).append(one)
+    return found
+
+
+def new_bases(plan):
+    """Pairs of `Base`s, read from both ends, that a Plan with a stadia does not have yet.
+
+    They are between set-ups that sight each other.
+    """
+    if not plan.bars:
+        return ()
+    like = plan.bases[0] if plan.bases else Base("", "", next(iter(plan.bars)), NEW_SD_RAD)
+    there = {frozenset((one.setup, one.to)) for one in plan.bases}
+    pairs = {}
+    for one in plan.setups:
+        for other in one.sights:
+            pairs.setdefault(frozenset((one.name, other)), (one.name, other))
+    return tuple(
+        tuple(replace(like, setup=a, to=b, row=None) for a, b in (ends, ends[::-1]))
+        for key, ends in pairs.items()
+        if key not in there
+    )
