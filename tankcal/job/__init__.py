@@ -8,14 +8,50 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # what a type checker reads; nothing of it runs
     from tankcal.job.loading import load
+    from tankcal.job.model import (
+        Bottom,
+        Course,
+        Datum,
+        Deadwood,
+        DeclaredInput,
+        End,
+        Horizontal,
+        InputFile,
+        Job,
+        Material,
+        Mesh,
+        Points,
+        Roof,
+        Sphere,
+        StatedVolume,
+        Survey,
+        Switches,
+        TableSpec,
+        Tank,
+    )
 
-_OF_MODEL = (
-    *("Bottom", "Course", "Datum", "Deadwood", "DeclaredInput", "End", "Horizontal", "InputFile"),
-    *("Job", "Material", "Mesh", "Points", "Roof", "Sphere", "StatedVolume", "Survey", "Switches"),
-    *("TableSpec", "Tank"),
-)
-
-__all__ = [*_OF_MODEL, "load"]
+__all__ = [
+    "Bottom",
+    "Course",
+    "Datum",
+    "Deadwood",
+    "DeclaredInput",
+    "End",
+    "Horizontal",
+    "InputFile",
+    "Job",
+    "Material",
+    "Mesh",
+    "Points",
+    "Roof",
+    "Sphere",
+    "StatedVolume",
+    "Survey",
+    "Switches",
+    "TableSpec",
+    "Tank",
+    "load",
+]
 
 
 def __getattr__(name):
