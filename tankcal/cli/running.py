@@ -163,10 +163,10 @@ def _fit(adjustment):
 
 def _compute(cluster, source, out, quiet, strict=False, papers=(), tell=_tell):
     prepare_for_small_work()
-    from tankcal.report import outputs
-
     show = Progress(quiet)
     job = read_job(source, show)
+    from tankcal.report import outputs
+
     outputs.refuse_foreign(out)
     result = tankcal.run(job, show.step, part_progress=show.part, cluster=cluster)
     adjustment = result.adjustment
@@ -227,10 +227,10 @@ def _capacity(result):
 
 def _adjust(cluster, source, out, quiet, strict, papers, tell=_tell):
     prepare_for_small_work()
-    from tankcal.report import outputs
-
     show = Progress(quiet)
     job = read_job(source, show, only="adjustment")
+    from tankcal.report import outputs
+
     outputs.refuse_foreign(out)
     adjustment = tankcal.adjust_job(job, show.step)
     if strict:

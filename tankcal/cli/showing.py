@@ -85,12 +85,13 @@ def complain(text):
 def read_job(source, show, **options):
     """The checked Job of a folder or workbook; from now on its language is spoken."""
     from tankcal.cli.asked_language import asked_language
-    from tankcal.job import load
 
     language = asked_language(source)
     if language is not None:
         speak(language)
     show.step(message("reading_job", "reading {file}", file=str(source)))
+    from tankcal.job import load  # half a second: the line above is told before
+
     return load(source, **options)
 
 

@@ -272,8 +272,35 @@ def _outline(rng, variances_m2, radius_m):
 def _excess_of(radii_m):
     """P^2 / (4 pi A) - 1 of the hull's perimeter and the outline's area, radii at even azimuths."""
     turn = FULL_TURN * np.arange(len(radii_m)) / len(radii_m)
-    hull = scipy.spatial.ConvexHull(
-        np.column_stack([radii_m * np.cos(turn), radii_m * np.sin(turn)])
-    )
     chords = (turn[1] / np.sin(turn[1] / 2) / 2) ** 2  # of the polygon of a circle, to its arcs
-    return chords * hull.area**2 / (2 * np.sum(radii_m**2) * turn[1] * np.pi) - 1
+    perimeter_m = hull_perimeter(radii_m * np.exp(1j * turn))
+    return chords * perimeter_m**2 / (2 * np.sum(radii_m**2) * turn[1] * np.pi) - 1
+
+
+def hull_perimeter(places):
+    """Perimeter of the convex hull of points round the origin.
+
+    A point on the inner side of the chord between its neighbours is no corner of the hull; without
+    such points others may become one, until every corner turns left.
+
+    Parameters
+    ----------
+    places : ndarray of complex, shape (n,)
+        x + i y of the points, anticlockwise, neighbours less than half a turn apart.
+
+    Returns
+    -------
+    float
+        In the unit of the points.
+
+    Examples
+    --------
+    >>> hull_perimeter(np.array([3, 1 + 1j, 4j, -3, -4j]))  # 1 + 1j stands within
+    20.0
+    """
+    while True:
+        after = np.roll(places, -1) - places
+        outer = (np.roll(after, 1).conj() * after).imag > 0
+        if outer.all():
+            return float(np.abs(after).sum())
+        places = places[outer]

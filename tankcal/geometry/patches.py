@@ -3,7 +3,6 @@
 import numpy as np
 import scipy
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 
 def find_patches(place_m, members, link_m, fewest):
@@ -35,6 +34,8 @@ def find_patches(place_m, members, link_m, fewest):
     """
     if len(members) < fewest:
         return []
+    from scipy.sparse.csgraph import connected_components
+
     norm = np.inf if np.ndim(link_m) else 2.0
     tree = scipy.spatial.cKDTree(place_m[members] / link_m)
     pairs = tree.query_pairs(1.0, p=norm, output_type="ndarray")

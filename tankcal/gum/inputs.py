@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from tankcal.gum.components import factor_of
 
@@ -113,6 +112,8 @@ class Inputs:
     @cached_property
     def groups(self):
         """Places of the inputs that are correlated with one another, one array a group."""
+        from scipy.sparse.csgraph import connected_components  # loads the solvers, too
+
         count, label = connected_components(csr_array(self.correlation != 0), directed=False)
         return tuple(np.flatnonzero(label == i) for i in range(count))
 

@@ -1,27 +1,34 @@
-"""The job: what the user hands in, read, checked and converted to SI (docs/job-format.md)."""
+"""The job: what the user hands in, read, checked and converted to SI (docs/job-format.md).
 
-from tankcal.job.loading import load
-from tankcal.job.model import (
-    Bottom,
-    Course,
-    Datum,
-    Deadwood,
-    DeclaredInput,
-    End,
-    Horizontal,
-    InputFile,
-    Job,
-    Material,
-    Mesh,
-    Points,
-    Roof,
-    Sphere,
-    StatedVolume,
-    Survey,
-    Switches,
-    TableSpec,
-    Tank,
-)
+Names are resolved when they are first used: what a job is called is told before it is read.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # what a type checker reads; nothing of it runs
+    from tankcal.job.loading import load
+    from tankcal.job.model import (
+        Bottom,
+        Course,
+        Datum,
+        Deadwood,
+        DeclaredInput,
+        End,
+        Horizontal,
+        InputFile,
+        Job,
+        Material,
+        Mesh,
+        Points,
+        Roof,
+        Sphere,
+        StatedVolume,
+        Survey,
+        Switches,
+        TableSpec,
+        Tank,
+    )
 
 __all__ = [
     "Bottom",
@@ -45,3 +52,14 @@ __all__ = [
     "Tank",
     "load",
 ]
+
+
+def __getattr__(name):
+    if name not in __all__:
+        raise AttributeError(f"module 'tankcal.job' has no attribute {name!r}")
+    room = "loading" if name == "load" else "model"
+    return getattr(import_module(f"tankcal.job.{room}"), name)
+
+
+def __dir__():
+    return sorted(__all__)

@@ -45,7 +45,8 @@ def test_help_loads_nothing_heavy():
 
 
 HEAVY = {  # what a run without papers has no need of, and waits for when it is imported
-    *("pandas", "scipy.stats", "scipy.optimize", "scipy.interpolate", "scipy.ndimage", "numba"),
+    *("pandas", "scipy.stats", "scipy.optimize", "scipy.interpolate", "scipy.ndimage"),
+    *("scipy.spatial", "scipy.fft", "numba"),
     *("matplotlib", "openpyxl", "xlsxwriter", "nbformat", "nbclient", "trimesh", "typst"),
 }
 SURVEYS = {  # of kinds that only some jobs have

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from generated_strapping import girth_of
 from generated_walls import FAMILIES, job_of, make_wall, survey
+from scipy.spatial import ConvexHull
 
 from tankcal.geometry.field.amplitudes import Amplitudes
 from tankcal.geometry.field.components import COMPONENTS
-from tankcal.geometry.girth import Ring, _excess_of, perimeter_excess, seen_excess
+from tankcal.geometry.girth import Ring, _excess_of, hull_perimeter, perimeter_excess, seen_excess
 from tankcal.pipeline.wall import find_wall
 from tankcal.pipeline.wall_straps import area_term
 
@@ -21,6 +22,18 @@ def test_a_sum_of_waves(orders, percent):
         0.020 * (2 / k) ** 1.5 * np.cos(k * TURN - 0.7 * k) for k in range(2, orders + 1)
     )
     assert 100 * _excess_of(radius) == pytest.approx(percent, abs=6e-5)
+
+
+@pytest.mark.parametrize("rough_m", [0.0, 0.001, 0.5])
+def test_perimeter_of_a_hull_is_that_of_qhull(rough_m):
+    """Another program, on outlines with waves, and on some that are jagged."""
+    rng = np.random.default_rng(int(1000 * rough_m))
+    angle = TURN[::10]
+    waves = rng.normal(size=40) * 0.02 / np.arange(1, 41)
+    radius = 7 + np.cos(np.outer(angle, np.arange(1, 41)) + rng.uniform(0, 6, 40)) @ waves
+    places = (radius + rough_m * rng.uniform(size=len(angle))) * np.exp(1j * angle)
+    hull = ConvexHull(np.column_stack([places.real, places.imag]))
+    assert hull_perimeter(places) == pytest.approx(hull.area, rel=1e-13)  # of a plane: perimeter
 
 
 def test_a_tape_bridges_what_is_concave():
