@@ -594,6 +594,24 @@ def test_plan_of_many_points_draws_weakest_ellipses(only, monkeypatch):
     assert places == {(row["x_m"], row["y_m"]) for row in rows if row["point"] in weakest}
 
 
+def test_marks_of_many_points_are_one_picture(only, monkeypatch):
+    """Words stay text, and what was set aside is no exception."""
+    paper = Paper(only[1] / "record.json")
+    for row in paper.readings:
+        row["removed"] = row["kind"] == "image coordinate" and row["ids"][0] == "S7"
+
+    def counted():
+        figure = figures.photo_residuals(paper)
+        svg = paper.figure(figure, "photo_residuals", factor=1).data["svg"]
+        return svg.count("<use"), svg.count("<image"), svg.count("<text")
+
+    marks, pictures, words = counted()
+    assert marks > 20
+    assert pictures == 0
+    monkeypatch.setattr("tankcal.pipeline.plots.MANY", 2)
+    assert counted() == (0, len(figures.shown_photos(paper)), words)
+
+
 def test_more_photos_than_fit_are_those_that_fit_worst(only):
     paper = Paper(only[1] / "record.json")
     photos = paper.record["adjustment"]["photos"]

@@ -3,7 +3,16 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import GREY, INK, PALE, RED, WIDTH, set_margins, styled
+from tankcal.pipeline.plots import (
+    GREY,
+    INK,
+    PALE,
+    RED,
+    WIDTH,
+    rasterize_many,
+    set_margins,
+    styled,
+)
 from tankcal.report.planning.sketches import unrolled
 
 MOST = 32  # bars
@@ -55,7 +64,7 @@ def weak_areas(paper):
     figure, ax = unrolled(paper, 2.9)
     shown = ax.scatter(
         targets.arc_m[known], targets.height_m[known], c=sd_mm[known], s=18, cmap="viridis_r",
-        zorder=3,
+        zorder=3, **rasterize_many(points),
     )  # fmt: skip
     for name, mark in (("weak", "o"), ("undetermined", "x")):
         mine = np.array([bool(getattr(one, name)) for one in points])

@@ -3,7 +3,16 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import FAINT, GREY, INK, RED, WIDTH, set_margins, styled
+from tankcal.pipeline.plots import (
+    FAINT,
+    GREY,
+    INK,
+    RED,
+    WIDTH,
+    rasterize_many,
+    set_margins,
+    styled,
+)
 from tankcal.planning.model import TAPED
 from tankcal.planning.patterns import full_turn
 from tankcal.planning.places import joints_m, place_of, reference_rad
@@ -25,7 +34,8 @@ def wall(paper):
     targets = plan.targets
     seen = np.array([name not in lost for name in targets.names])
     ax.plot(targets.arc_m[seen], targets.height_m[seen], ".", color=INK, markersize=3,
-            zorder=3, label=paper.word("legend.targets"))  # fmt: skip
+            zorder=3, label=paper.word("legend.targets"),
+            **rasterize_many(targets.names))  # fmt: skip
     _control(ax, paper)
     _marks(ax, paper, lost)
     for table in TAPED:

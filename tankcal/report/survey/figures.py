@@ -15,6 +15,7 @@ from tankcal.pipeline.plots import (
     PALE,
     RED,
     WIDTH,
+    rasterize_many,
     round_factor,
     set_margins,
     styled,
@@ -66,9 +67,8 @@ def plan(paper):
     figure = Figure(figsize=(WIDTH, 4.6))
     ax = figure.subplots()
     _lines(ax, paper, places, origin)
-    many = {"rasterized": len(points) > MANY}
     _ellipses(ax, points, xy - origin, factor)
-    _marks(ax, paper, points, xy - origin, many)
+    _marks(ax, paper, points, xy - origin)
     photos = _photos(ax, paper, adjustment["photos"], origin)
     ax.set_aspect("equal")
     ax.autoscale_view()
@@ -127,16 +127,16 @@ def _lines(ax, paper, places, origin):
         )  # fmt: skip
 
 
-def _marks(ax, paper, points, xy, many):
+def _marks(ax, paper, points, xy):
     kinds = np.array([one["kind"] for one in points])
     plain = kinds == "point"
     ax.plot(*xy[plain].T, ".", color=GREY, markersize=2, zorder=3,
-            label=paper.word("plan.point"), **many)  # fmt: skip
+            label=paper.word("plan.point"), **rasterize_many(points))  # fmt: skip
     for kind, (mark, colour) in _MARKS.items():
         own = kinds == kind
         if own.any():
             ax.plot(*xy[own].T, mark, color=colour, markersize=3.5, zorder=4,
-                    label=paper.word(f"plan.{kind}"))  # fmt: skip
+                    label=paper.word(f"plan.{kind}"), **rasterize_many(xy[own]))  # fmt: skip
 
 
 def _on_page(length_m, extent_m):
@@ -267,12 +267,13 @@ def photo_residuals(paper, of_photo=None):
                 edgecolor=GREY,
             )
         )  # fmt: skip
-        many = {"rasterized": len(xy) > MANY}
+        many = rasterize_many(xy)
         ends = xy + factor * v
         vectors = np.stack([xy, ends, np.full_like(xy, np.nan)], axis=1)  # one broken line
         ax.plot(*vectors.reshape(-1, 2).T, color=INK, linewidth=0.6, **many)
         ax.plot(*xy.T, ".", color=INK, markersize=1.6, **many)
-        ax.plot(*aside.T, "x", color=RED, markersize=3.5, markeredgewidth=0.8)
+        ax.plot(*aside.T, "x", color=RED, markersize=3.5, markeredgewidth=0.8,
+                **rasterize_many(aside))  # fmt: skip
         ax.set(aspect="equal", xlim=(-1.03 * half[0], 1.03 * half[0]),
                ylim=(-1.03 * half[1], 1.03 * half[1]))  # fmt: skip
         rms = paper.number(photo["rms_mm"], "image um", decimals=1)

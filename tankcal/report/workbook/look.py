@@ -92,7 +92,9 @@ def pieces_of(text):
 def lines_in(column, width):
     """How many lines each cell of a column of texts takes."""
     room = width - _INDENT_PX / _UNIT_PX
-    return [1 if cell is None else lines_of(cell, room) for cell in column.cells]
+    texts = [cell if cell is None else str(cell) for cell in column.cells]
+    lines = {text: 1 if text is None else lines_of(text, room) for text in set(texts)}
+    return [lines[text] for text in texts]
 
 
 def lines_of(text, width, bold=False):

@@ -151,12 +151,13 @@ class Writer:
         each = digits if isinstance(digits, list) else [digits] * len(cells)
         keys = [(one, index in muted) for index, one in enumerate(each)]
         looks = {key: self._cell_look(*key, column.percent) for key in dict.fromkeys(keys)}
-        if any(type(value) is float for value in cells):
-            numbers = [value if type(value) is float else None for value in cells]
-            made = {key: self.format(**look) for key, look in looks.items()}
-            sheet.write_numbers(first, place, numbers, [made[key] for key in keys])
+        made = {key: self.format(**look) for key, look in looks.items()}
+        numbers = [value if type(value) is float else None for value in cells]
+        sheet.write_numbers(first, place, numbers, [made[key] for key in keys])
         for row, (value, key) in enumerate(zip(cells, keys, strict=True), first):
-            if type(value) is not float:
+            if type(value) is str and key[0] is None:  # a column of texts
+                sheet.write_string(row, place, value[:_LONGEST_CELL], made[key])
+            elif type(value) is not float:
                 self.put(sheet, row, place, value, **looks[key])
 
     @staticmethod
