@@ -1,5 +1,7 @@
 """The part of the record that lists what was adjusted: points, photos, cameras, instruments."""
 
+from dataclasses import fields
+
 import numpy as np
 from scipy.special import fdtri, gammaincinv
 
@@ -7,6 +9,7 @@ from tankcal.calibration.edges import Frame, own_shift
 from tankcal.calibration.interiors import interiors_of
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.geometry.rotations import angle_derivatives, angles_of
+from tankcal.record.columns import ArrayColumns, ArrayRows, plain_if_short
 from tankcal.record.schema import Saved, filled_from, key
 from tankcal.survey.network import correlations
 from tankcal.survey.network.quality import ellipsoid_factor, ellipsoids, precision
@@ -135,7 +138,7 @@ class ControlSystem(Saved):
 
 
 def adjusted_points_of(adjustment, measurements=None):
-    """The `AdjustedPoint` of each point, in their order."""
+    """The `AdjustedPoint` of each point, in their order, as rows of columns."""
     covariance, dof = np.asarray(adjustment.covariance_m2), adjustment.dof
     sd = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
     axes, directions = ellipsoids(covariance, ELLIPSE, dof)
@@ -143,18 +146,15 @@ def adjusted_points_of(adjustment, measurements=None):
     plan, plan_azimuth = _ellipses(covariance[:, :2, :2], dof)
     rays = _rays(adjustment)
     spherical, quadratic = sd.mean(axis=1), np.sqrt(np.sum(sd**2, axis=1))
-    columns = (spherical, quadratic, axes, azimuth, elevation, plan, plan_azimuth)
-    return [
-        AdjustedPoint(*row)
-        for row in zip(
-            adjustment.names,
-            _kinds(adjustment, measurements),
-            [rays.get(name, 0) for name in adjustment.names],
-            np.asarray(adjustment.fixed).tolist(),
-            *(np.asarray(column).tolist() for column in columns),
-            strict=True,
-        )
-    ]
+    columns = (
+        list(adjustment.names),
+        _kinds(adjustment, measurements),
+        [rays.get(name, 0) for name in adjustment.names],
+        np.asarray(adjustment.fixed),
+        *(spherical, quadratic, axes, azimuth, elevation, plan, plan_azimuth),
+    )
+    keys = (one.name for one in fields(AdjustedPoint))
+    return plain_if_short(ArrayRows(ArrayColumns(dict(zip(keys, columns, strict=True)))))
 
 
 def _direction(vectors):

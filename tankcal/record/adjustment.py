@@ -21,6 +21,7 @@ from tankcal.record.adjusted import (
     precision_of,
     systems_of,
 )
+from tankcal.record.columns import ArrayColumns, plain_if_short
 from tankcal.record.images import (
     DepthCorrection,
     FiducialTransformation,
@@ -138,7 +139,9 @@ class AdjustmentRecord(Saved):
     groups: list[AdjustedGroup] = key("kinds of observations and instruments")
     held: list[HeldValue] = key("values that hold exactly: sd 0")
     removed: list[AdjustedReading] = key("readings set aside, the worst first")
-    residuals: Annotated[dict, Columns(AdjustedReading)] = key("all readings, a list for each key")
+    residuals: Annotated[dict, Columns(AdjustedReading)] | None = key(
+        "all readings, a list for each key; null: they are in the file of `long_tables`"
+    )
     cameras: list[AdjustedCamera] = key("sets of interior parameters")
     photos: list[AdjustedPhoto] = key("each photo")
     image_readings: ImageReadings | None = key("repeated readings; null: each point was read once")
@@ -147,7 +150,9 @@ class AdjustmentRecord(Saved):
     instruments: list[AdjustedInstrument] = key("each instrument")
     systems: list[ControlSystem] = key("further systems of control")
     setups: list[AdjustedSetup] = key("each set-up")
-    points: list[AdjustedPoint] = key("in the order of `points` of the record")
+    points: list[AdjustedPoint] | None = key(
+        "in the order of `points` of the record; null: they are in the file of `long_tables`"
+    )
     precision: PointPrecision | None = key("null: every point is fixed")
     check_points: CheckedPoints | None = key("null: there are none")
     causes: list[SharedCause] = key("that points have in common")
@@ -201,11 +206,11 @@ def _reading(reading):
 
 
 def _columns(readings):
-    """{key: values} of all readings, as `AdjustedReading` has them; there may be 200 000."""
+    """The columns of all readings, as `AdjustedReading` has them; there may be 200 000."""
     columns = {one.name: [getattr(r, one.name) for r in readings] for one in fields(Reading)}
     columns["ids"] = [list(names) for names in columns["ids"]]
     columns["controlled"] = [_controlled(reading) for reading in readings]
-    return columns
+    return plain_if_short(ArrayColumns(columns))
 
 
 def _controlled(reading):

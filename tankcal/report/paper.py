@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 from tankcal.record import load
-from tankcal.record.plain_data import rows_of, without_collection
+from tankcal.record.columns import as_columns
 from tankcal.report import attachments, blocks
 from tankcal.report.letterhead import read_saved
 from tankcal.report.plain import Column, PlainPaper
@@ -63,9 +63,8 @@ class Paper(PlainPaper):
 
     @cached_property
     def readings(self):
-        """Every reading of the adjustment, a dict each."""
-        with without_collection():
-            return rows_of(self.record["adjustment"]["residuals"])
+        """`ArrayColumns` of every reading of the adjustment."""
+        return as_columns(self.record["adjustment"]["residuals"])
 
     # ---- blocks
 

@@ -1,6 +1,8 @@
 """Single readings: those set aside, those that fit worst, those that nothing controls."""
 
-from tankcal.record.plain_data import columns_of, rows_of
+import numpy as np
+
+from tankcal.record.columns import ArrayRows
 from tankcal.report.survey.common import MOST_ROWS, with_note
 from tankcal.report.tables.readings import READINGS, in_their_units
 
@@ -9,10 +11,9 @@ WEAK = 0.1  # redundancy number below which a blunder has to be 13 sds to be fou
 
 
 def adjusted(paper):
-    """Readings that took part: neither set aside nor only compared, nor held."""
-    return [
-        row for row in paper.readings if not row["removed"] and not row["check"] and row["sd"] != 0
-    ]
+    """`ArrayColumns` of readings that took part: neither set aside nor only compared, nor held."""
+    found = paper.readings.arrays
+    return paper.readings.take(~found["removed"] & ~found["check"] & (found["sd"] != 0))
 
 
 def held(paper):
@@ -29,7 +30,7 @@ def table(paper, name, rows, **values):
     """The table of readings of that name, cut to the first MOST_ROWS."""
     if not rows:
         return []
-    shown = rows_of(in_their_units(columns_of(rows[:MOST_ROWS])))
+    shown = list(in_their_units(rows[:MOST_ROWS]).rows())
     return with_note(paper, paper.show(READINGS, shown, on=name, **values), shown, rows)
 
 
@@ -40,15 +41,28 @@ def removed(paper):
 
 def largest(paper):
     """Readings with the largest w of those that were adjusted."""
-    controlled = [row for row in adjusted(paper) if row["controlled"] and row["w"] is not None]
-    return sorted(controlled, key=lambda row: -abs(row["w"]))[:WORST]
+    return _first(_controlled(paper), "w")
+
+
+def _controlled(paper):
+    """Of the readings that took part those that others control."""
+    found = adjusted(paper)
+    return found.take(found.arrays["controlled"])
+
+
+def _first(found, key):
+    """The WORST readings with the largest size of `key`, where they have one."""
+    size = np.abs(found.arrays[key])
+    known = np.flatnonzero(np.isfinite(size))
+    return list(found.take(known[np.argsort(-size[known], kind="stable")[:WORST]]).rows())
 
 
 def control(paper):
     """What nothing controls, and where an undetected blunder would do most."""
-    a, alone = paper.record["adjustment"], [row for row in adjusted(paper) if not row["controlled"]]
-    numbers_of = [row["redundancy"] for row in adjusted(paper) if row["controlled"]]
-    found = table(paper, "uncontrolled", alone, count=len(alone), all=len(adjusted(paper)))
+    a, every = paper.record["adjustment"], adjusted(paper)
+    alone = ArrayRows(every.take(~every.arrays["controlled"]))
+    numbers_of = _controlled(paper)["redundancy"]
+    found = table(paper, "uncontrolled", alone, count=len(alone), all=every.count)
     if not alone and numbers_of:
         smallest, largest, mean = (
             paper.number(value, digits=2)
@@ -63,19 +77,13 @@ def control(paper):
     return found + table(
         paper,
         "weakest_readings",
-        _weakest(paper),
+        _first(_controlled(paper), "effect_m"),
         power=paper.percent(a["power"]),
         alpha=paper.percent(a["alpha"]),
     )
 
 
-def _weakest(paper):
-    """Readings whose undetected bias would move a point most."""
-    felt = [row for row in adjusted(paper) if row["controlled"] and row["effect_m"] is not None]
-    return sorted(felt, key=lambda row: -row["effect_m"])[:WORST]
-
-
 def compared(paper):
     """Readings that were only compared, the largest difference in its sd first."""
-    checks = [row for row in paper.readings if row["check"]]
+    checks = paper.readings.take(paper.readings.arrays["check"]).rows()
     return sorted(checks, key=lambda row: -abs(row["w"] or 0.0))
