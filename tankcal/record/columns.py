@@ -243,8 +243,13 @@ def count_rows(found):
     return len(next(iter(found.values()), ())) if isinstance(found, Mapping) else len(found)
 
 
+def is_long(found):
+    """Whether a table of a record has more than MOST_ROWS rows."""
+    return count_rows(found) > MOST_ROWS
+
+
 def plain_if_short(found):
     """The dict or list of `ArrayColumns` or `ArrayRows`; more than MOST_ROWS rows stay arrays."""
-    if count_rows(found) > MOST_ROWS:
+    if is_long(found):
         return found
     return dict(found) if isinstance(found, Mapping) else list(found)

@@ -16,7 +16,7 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import list_some, message
-from tankcal.record.columns import MOST_ROWS, ArrayColumns, ArrayRows, Texts, as_columns, count_rows
+from tankcal.record.columns import ArrayColumns, ArrayRows, Texts, as_columns, is_long
 from tankcal.record.schema import Saved, key
 from tankcal.record.versions import RECORD
 
@@ -60,7 +60,7 @@ def split(record, folder):
     long = {}
     for place in TABLES:
         found = _at(record, place)
-        if found is not None and count_rows(found) > MOST_ROWS:
+        if found is not None and is_long(found):
             long[place] = as_columns(found)
     if not long:
         return record
@@ -170,7 +170,7 @@ def long_pairs(record, other):
     pairs = {
         place: tuple(map(as_columns, pair))
         for place, pair in pairs.items()
-        if None not in pair and max(map(count_rows, pair)) > MOST_ROWS
+        if None not in pair and any(map(is_long, pair))
     }
     return pairs, *(_with(one, dict.fromkeys(pairs)) for one in (record, other))
 
