@@ -9,7 +9,7 @@ from tankcal.calibration.edges import Frame, own_shift
 from tankcal.calibration.interiors import interiors_of
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.geometry.rotations import angle_derivatives, angles_of
-from tankcal.record.columns import ArrayColumns, ArrayRows, plain_if_short
+from tankcal.record.columns import ArrayColumns, ArrayRows, Texts, plain_if_short
 from tankcal.record.schema import Saved, filled_from, key
 from tankcal.survey.network import correlations
 from tankcal.survey.network.quality import ellipsoid_factor, ellipsoids, precision
@@ -242,12 +242,13 @@ def photos_of(adjustment):
 
 def _fit_of_photos(adjustment):
     """{photo: (points used, root mean square residual of a coordinate, mm)}."""
-    sums = {}
-    for one in adjustment.readings:
-        if one.kind == "image coordinate" and not one.removed and not one.check:
-            count, square = sums.get(one.ids[0], (0, 0.0))
-            sums[one.ids[0]] = count + 1, square + one.residual**2
-    return {name: (count // 2, np.sqrt(square / count)) for name, (count, square) in sums.items()}
+    readings = adjustment.readings
+    used = readings.where(readings.are("image coordinate") & ~readings.removed & ~readings.check)
+    photos = Texts.of([ids[0] for ids in used.columns["ids"]])
+    count = np.bincount(photos.codes, minlength=len(photos.texts))
+    square = np.bincount(photos.codes, used.columns["residual"] ** 2, len(photos.texts))
+    rms = np.sqrt(square / count).tolist()
+    return dict(zip(photos.texts, zip((count // 2).tolist(), rms, strict=True), strict=True))
 
 
 def cameras_of(adjustment, measurements=None):

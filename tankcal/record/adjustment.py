@@ -1,6 +1,6 @@
 """The part of the record that says how the survey was adjusted, and how good that is."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -33,7 +33,7 @@ from tankcal.record.images import (
 from tankcal.record.schema import Columns, Saved, filled_from, key
 from tankcal.record.texts import Text, text_of
 from tankcal.survey.network.reliability import UNCONTROLLED, tau_limit
-from tankcal.survey.results import DatumReport, GroupOfReadings, Reading
+from tankcal.survey.results import DatumReport, GroupOfReadings, Reading, Readings
 
 CONFIDENCE = 0.95  # of the global test and of the intervals of variance factors
 CHECKABLE = 1.0  # a group with less redundancy says next to nothing about its variance
@@ -182,8 +182,8 @@ def adjustment_of(adjustment, measurements=None):
         alpha=ALPHA,
         power=POWER,
         groups=[_group(group) for group in adjustment.groups],
-        held=[_held(reading) for reading in adjustment.readings if _holds(reading)],
-        removed=[_reading(reading) for reading in adjustment.removed],
+        held=_held(adjustment.readings),
+        removed=_removed(Readings.of(adjustment.removed)),
         residuals=_columns(adjustment.readings),
         cameras=cameras_of(adjustment, measurements),
         photos=photos_of(adjustment),
@@ -201,33 +201,36 @@ def adjustment_of(adjustment, measurements=None):
     )
 
 
-def _reading(reading):
-    return AdjustedReading(**vars(reading), controlled=_controlled(reading))
+def _removed(readings):
+    """The `AdjustedReading` of each reading that was set aside."""
+    rows = zip(readings, _controlled(readings).tolist(), strict=True)
+    return [AdjustedReading(**vars(one), controlled=controlled) for one, controlled in rows]
 
 
 def _columns(readings):
     """The columns of all readings, as `AdjustedReading` has them; there may be 200 000."""
-    columns = {one.name: [getattr(r, one.name) for r in readings] for one in fields(Reading)}
-    columns["ids"] = [list(names) for names in columns["ids"]]
-    columns["controlled"] = [_controlled(reading) for reading in readings]
+    found = readings.columns | {"controlled": _controlled(readings)}
+    columns = {
+        name: column.tolist() if column.dtype == object else column
+        for name, column in found.items()
+    }
     return plain_if_short(ArrayColumns(columns))
 
 
-def _controlled(reading):
-    """Whether others would show an error of a reading, or of a value that is held."""
-    if _holds(reading):
-        return bool(np.isfinite(reading.mdb))
-    return bool(reading.check or reading.redundancy > UNCONTROLLED)
+def _controlled(readings):
+    """(n,) whether others would show an error of readings, or of values that are held."""
+    found = readings.columns
+    of_others = readings.check | (found["redundancy"] > UNCONTROLLED)
+    return np.where(readings.hold, np.isfinite(found["mdb"]), of_others)
 
 
-def _holds(reading):
-    """Whether a value holds exactly: it has neither residual nor redundancy, but a reaction."""
-    return reading.sd == 0 and not (reading.check or reading.removed)
+def _held(readings):
+    """The `HeldValue` of each value that holds exactly."""
+    held = readings.where(readings.hold)
+    return list(map(_held_value, held, _controlled(held).tolist()))
 
 
-def _held(reading):
-    """The `HeldValue` of a reading."""
-    controlled = _controlled(reading)
+def _held_value(reading, controlled):
     sd = reading.mdb / noncentrality(ALPHA, POWER) if controlled else None
     return filled_from(
         HeldValue,
