@@ -29,6 +29,7 @@ TABLES = {  # its place: the object that a row of it is in the schema
     "adjustment.residuals": "AdjustedReading",
 }
 BY_COLUMNS = ("adjustment.residuals",)  # {key: values} in record.json; the others lists of rows
+MOST_UNPACKED_BYTES = 2_000_000_000
 _TEXTS = ".texts"  # behind the name of a column: its texts, of which the column has the numbers
 
 
@@ -116,7 +117,7 @@ def copy_record(record, source, folder):
         raise InputError(problems)
     shutil.copyfile(source, Path(folder) / RECORD.file)
     for path in {one.path for one in _tables_in(record) if isinstance(one, _LazyColumns)}:
-        shutil.copyfile(path, Path(folder) / FILE)
+        shutil.copyfile(path, Path(folder) / path.name)
 
 
 # ---- reading
@@ -223,6 +224,8 @@ class _Beside:
         content = self._content()
         try:
             with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+                if sum(one.file_size for one in arrays.zip.infolist()) > MOST_UNPACKED_BYTES:
+                    raise ValueError("too large")
                 return {
                     place: _table(arrays, place, rows) for place, rows in self._said["rows"].items()
                 }
