@@ -4,9 +4,10 @@
 
 TREE is a folder that holds the package `tankcal`, this one unless said otherwise; several are
 measured in turn, N times each (3), every run in a process of its own with one BLAS thread, and the
-medians are printed, of the clock and of the processor. The large block has the size of "roma", a
-set that DBAT ships: 60 photos, 26 321 points and about 90 500 image points, here simulated over
-hilly ground; the small one has 6 photos and 12 points. The goal: writing takes less than computing.
+medians are printed, of the clock and of the processor, with the peak of the memory. The large block
+has the size of "roma", a set that DBAT ships: 60 photos, 26 321 points and about 90 500 image
+points, here simulated over hilly ground; the small one has 6 photos and 12 points. The goal:
+writing takes less than computing.
 """
 
 import argparse
@@ -126,6 +127,11 @@ def _cpu():
     return used.ru_utime + used.ru_stime
 
 
+def _peak_mb():
+    """The largest memory of this process so far."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
 def _sizes(folder):
     return {f"{path.name}_MB": path.stat().st_size for path in sorted(folder.iterdir())
             if path.stat().st_size > 2e5}  # fmt: skip
@@ -139,11 +145,11 @@ def phases(job, out, no_papers):
     begin = _now()
     job = tankcal.load(job, only="adjustment")
     adjustment = tankcal.adjust_job(job)
-    computed = _now()
+    computed, found = _now(), {"computing, peak_MB": _peak_mb()}
     more = {"papers": False} if no_papers else {}
     outputs.write_adjustment(job, adjustment, out, **more)
     written = _now()
-    found = {}
+    found["with writing, peak_MB"] = _peak_mb()
     for what, start, end in (("computing", begin, computed), ("writing", computed, written)):
         passed, worked = np.subtract(end, start).tolist()
         found |= {f"{what}_s": passed, f"{what}, processor_s": worked}

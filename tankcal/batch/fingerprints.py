@@ -17,6 +17,7 @@ import tankcal
 from tankcal.batch.finding import BOOK
 from tankcal.job.folder import OF_INSPECTIONS
 from tankcal.job.tables import COVARIANCE_FILE, SETTINGS_FILE
+from tankcal.record import long_tables
 from tankcal.report.manifest import digest_of
 
 NEVER_READ = (  # endings of what lies beside jobs
@@ -86,8 +87,9 @@ def inputs_of(source):
         names += _named_in_book(path)
     elif path.suffix.lower() == ".toml":
         names += _named_in_former(path)
-    elif path.name == "record.json" and path.with_name(COVARIANCE_FILE).is_file():
-        names.append(COVARIANCE_FILE)
+    elif path.name == "record.json":
+        beside = (COVARIANCE_FILE, long_tables.FILE)
+        names += [one for one in beside if path.with_name(one).is_file()]
     return [[name, _digest(path.parent / name)] for name in names]
 
 

@@ -122,7 +122,7 @@ def refuse_kept_readings(job, adjustment):
     """Raise InputError for kept readings that are none of their own in the adjustment, or whose
     point the search left without the others.
     """
-    found = {(one.file, one.row) for one in adjustment.readings}
+    found = set(zip(*(adjustment.readings.columns[one] for one in ("file", "row")), strict=True))
     files = {one.table: one.file for one in job.measurements.readings if _is_own(one, one.table)}
     if job.measurements.image_points is not None:
         files["image_points"] = job.measurements.image_points.file

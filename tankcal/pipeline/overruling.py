@@ -147,12 +147,10 @@ class _Attempt:
 
     def _of_reading(self, one):
         file = _file_of(self.found.job.measurements, one.table)
-        mine = [
-            reading
-            for reading in self.found.adjustment.readings
-            if (reading.file, reading.row) == (file, one.reading_row)
-        ]
-        if not mine:
+        readings = self.found.adjustment.readings
+        is_it = (readings.columns["file"] == file) & (readings.columns["row"] == one.reading_row)
+        mine = readings.where(is_it)
+        if not len(mine):
             return NO_SOLUTION, np.nan, np.nan
         worst = max(mine, key=lambda reading: abs(reading.w) if np.isfinite(reading.w) else 0.0)
         return "removed" if worst.removed else "", np.nan, float(worst.w)

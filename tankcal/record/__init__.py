@@ -5,12 +5,13 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.record.plain_data import without_collection
+from tankcal.record.long_tables import attached, copy_record, split
+from tankcal.record.plain_data import whole, without_collection
 from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
 
 __all__ = [
-    "FORMAT", "VERSION", "load", "migrated", "read", "record_of", "record_of_adjustment", "save",
-    "version_of",
+    "FORMAT", "VERSION", "copy_record", "load", "migrated", "read", "record_of",
+    "record_of_adjustment", "save", "version_of",
 ]  # fmt: skip
 
 
@@ -50,7 +51,7 @@ def record_of_adjustment(job, adjustment):
 
 
 def save(record, path):
-    """Write a record as UTF-8 JSON.
+    """Write a record as UTF-8 JSON, and its long tables into a file beside it.
 
     Parameters
     ----------
@@ -58,12 +59,17 @@ def save(record, path):
         Of `record_of`.
     path : path
     """
-    text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    text = json.dumps(
+        split(record, Path(path).parent), ensure_ascii=False, allow_nan=False, separators=(",", ":")
+    )
     Path(path).write_text(text + "\n", encoding="utf-8")
 
 
 def load(path):
     """Read a record of this version, or of an older one, to which is added what it did not have.
+
+    Tables of many rows, which stand in a file beside it, are read when they are asked for: then
+    InputError says, in one line, when that file is missing or is not the one that it was.
 
     Parameters
     ----------
@@ -88,7 +94,7 @@ def load(path):
             "record_unreadable", "cannot be read as a record: {error}", error=str(error)
         )
         raise InputError(Problem(name, expected)) from error
-    return migrated(record, name)
+    return attached(migrated(record, name), path)
 
 
 def read(path):
@@ -112,4 +118,4 @@ def read(path):
     from tankcal.record.making import Record
     from tankcal.record.schema import from_plain
 
-    return from_plain(Record, load(path), Path(path).name)
+    return from_plain(Record, whole(load(path)), Path(path).name)

@@ -1,10 +1,13 @@
 """The part of the record that lists what was adjusted: points, photos, cameras, instruments."""
 
+from dataclasses import fields
+
 import numpy as np
 from scipy.special import fdtri, gammaincinv
 
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.geometry.rotations import angle_derivatives, angles_of
+from tankcal.record.columns import ArrayColumns, ArrayRows, Texts, plain_if_short
 from tankcal.record.schema import Saved, filled_from, key
 from tankcal.survey.network.quality import ellipsoid_factor, ellipsoids, precision
 
@@ -132,7 +135,7 @@ class ControlSystem(Saved):
 
 
 def adjusted_points_of(adjustment, measurements=None):
-    """The `AdjustedPoint` of each point, in their order."""
+    """The `AdjustedPoint` of each point, in their order, as rows of columns."""
     covariance, dof = np.asarray(adjustment.covariance_m2), adjustment.dof
     sd = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
     axes, directions = ellipsoids(covariance, ELLIPSE, dof)
@@ -140,18 +143,15 @@ def adjusted_points_of(adjustment, measurements=None):
     plan, plan_azimuth = _ellipses(covariance[:, :2, :2], dof)
     rays = _rays(adjustment)
     spherical, quadratic = sd.mean(axis=1), np.sqrt(np.sum(sd**2, axis=1))
-    columns = (spherical, quadratic, axes, azimuth, elevation, plan, plan_azimuth)
-    return [
-        AdjustedPoint(*row)
-        for row in zip(
-            adjustment.names,
-            _kinds(adjustment, measurements),
-            [rays.get(name, 0) for name in adjustment.names],
-            np.asarray(adjustment.fixed).tolist(),
-            *(np.asarray(column).tolist() for column in columns),
-            strict=True,
-        )
-    ]
+    columns = (
+        list(adjustment.names),
+        _kinds(adjustment, measurements),
+        [rays.get(name, 0) for name in adjustment.names],
+        np.asarray(adjustment.fixed),
+        *(spherical, quadratic, axes, azimuth, elevation, plan, plan_azimuth),
+    )
+    keys = (one.name for one in fields(AdjustedPoint))
+    return plain_if_short(ArrayRows(ArrayColumns(dict(zip(keys, columns, strict=True)))))
 
 
 def _direction(vectors):
@@ -239,12 +239,13 @@ def photos_of(adjustment):
 
 def _fit_of_photos(adjustment):
     """{photo: (points used, root mean square residual of a coordinate, mm)}."""
-    sums = {}
-    for one in adjustment.readings:
-        if one.kind == "image coordinate" and not one.removed and not one.check:
-            count, square = sums.get(one.ids[0], (0, 0.0))
-            sums[one.ids[0]] = count + 1, square + one.residual**2
-    return {name: (count // 2, np.sqrt(square / count)) for name, (count, square) in sums.items()}
+    readings = adjustment.readings
+    used = readings.where(readings.are("image coordinate") & ~readings.removed & ~readings.check)
+    photos = Texts.of([ids[0] for ids in used.columns["ids"]])
+    count = np.bincount(photos.codes, minlength=len(photos.texts))
+    square = np.bincount(photos.codes, used.columns["residual"] ** 2, len(photos.texts))
+    rms = np.sqrt(square / count).tolist()
+    return dict(zip(photos.texts, zip((count // 2).tolist(), rms, strict=True), strict=True))
 
 
 def cameras_of(adjustment, measurements=None):

@@ -1,6 +1,6 @@
 """The part of the record that says how the survey was adjusted, and how good that is."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -21,6 +21,7 @@ from tankcal.record.adjusted import (
     precision_of,
     systems_of,
 )
+from tankcal.record.columns import ArrayColumns, plain_if_short
 from tankcal.record.images import (
     DepthCorrection,
     FiducialTransformation,
@@ -31,7 +32,8 @@ from tankcal.record.images import (
 )
 from tankcal.record.schema import Columns, Saved, filled_from, key
 from tankcal.record.texts import Text, text_of
-from tankcal.survey.results import DatumReport, GroupOfReadings, Reading
+
+from tankcal.survey.results import DatumReport, GroupOfReadings, Reading, Readings
 
 CONFIDENCE = 0.95  # of the global test and of the intervals of variance factors
 CHECKABLE = 1.0  # a group with less redundancy says next to nothing about its variance
@@ -137,7 +139,9 @@ class AdjustmentRecord(Saved):
     groups: list[AdjustedGroup] = key("kinds of observations and instruments")
     held: list[HeldValue] = key("values that hold exactly: sd 0")
     removed: list[AdjustedReading] = key("readings set aside, the worst first")
-    residuals: Annotated[dict, Columns(AdjustedReading)] = key("all readings, a list for each key")
+    residuals: Annotated[dict, Columns(AdjustedReading)] | None = key(
+        "all readings, a list for each key; null: they are in the file of `long_tables`"
+    )
     cameras: list[AdjustedCamera] = key("sets of interior parameters")
     photos: list[AdjustedPhoto] = key("each photo")
     image_readings: ImageReadings | None = key("repeated readings; null: each point was read once")
@@ -146,7 +150,9 @@ class AdjustmentRecord(Saved):
     instruments: list[AdjustedInstrument] = key("each instrument")
     systems: list[ControlSystem] = key("further systems of control")
     setups: list[AdjustedSetup] = key("each set-up")
-    points: list[AdjustedPoint] = key("in the order of `points` of the record")
+    points: list[AdjustedPoint] | None = key(
+        "in the order of `points` of the record; null: they are in the file of `long_tables`"
+    )
     precision: PointPrecision | None = key("null: every point is fixed")
     check_points: CheckedPoints | None = key("null: there are none")
     causes: list[SharedCause] = key("that points have in common")
@@ -178,8 +184,8 @@ def adjustment_of(adjustment, measurements=None):
         alpha=ALPHA,
         power=POWER,
         groups=[_group(group) for group in adjustment.groups],
-        held=[_held(reading) for reading in adjustment.readings if _holds(reading)],
-        removed=[_reading(reading) for reading in adjustment.removed],
+        held=_held(adjustment.readings),
+        removed=_removed(Readings.of(adjustment.removed)),
         residuals=_columns(adjustment.readings),
         cameras=cameras_of(adjustment, measurements),
         photos=photos_of(adjustment),
@@ -197,33 +203,36 @@ def adjustment_of(adjustment, measurements=None):
     )
 
 
-def _reading(reading):
-    return AdjustedReading(**vars(reading), controlled=_controlled(reading))
+def _removed(readings):
+    """The `AdjustedReading` of each reading that was set aside."""
+    rows = zip(readings, _controlled(readings).tolist(), strict=True)
+    return [AdjustedReading(**vars(one), controlled=controlled) for one, controlled in rows]
 
 
 def _columns(readings):
-    """{key: values} of all readings, as `AdjustedReading` has them; there may be 200 000."""
-    columns = {one.name: [getattr(r, one.name) for r in readings] for one in fields(Reading)}
-    columns["ids"] = [list(names) for names in columns["ids"]]
-    columns["controlled"] = [_controlled(reading) for reading in readings]
-    return columns
+    """The columns of all readings, as `AdjustedReading` has them; there may be 200 000."""
+    found = readings.columns | {"controlled": _controlled(readings)}
+    columns = {
+        name: column.tolist() if column.dtype == object else column
+        for name, column in found.items()
+    }
+    return plain_if_short(ArrayColumns(columns))
 
 
-def _controlled(reading):
-    """Whether others would show an error of a reading, or of a value that is held."""
-    if _holds(reading):
-        return bool(np.isfinite(reading.mdb))
-    return bool(reading.check or reading.redundancy > UNCONTROLLED)
+def _controlled(readings):
+    """(n,) whether others would show an error of readings, or of values that are held."""
+    found = readings.columns
+    of_others = readings.check | (found["redundancy"] > UNCONTROLLED)
+    return np.where(readings.hold, np.isfinite(found["mdb"]), of_others)
 
 
-def _holds(reading):
-    """Whether a value holds exactly: it has neither residual nor redundancy, but a reaction."""
-    return reading.sd == 0 and not (reading.check or reading.removed)
+def _held(readings):
+    """The `HeldValue` of each value that holds exactly."""
+    held = readings.where(readings.hold)
+    return list(map(_held_value, held, _controlled(held).tolist()))
 
 
-def _held(reading):
-    """The `HeldValue` of a reading."""
-    controlled = _controlled(reading)
+def _held_value(reading, controlled):
     sd = reading.mdb / noncentrality(ALPHA, POWER) if controlled else None
     return filled_from(
         HeldValue,

@@ -24,6 +24,7 @@ from tankcal.record.great_circles import GreatCirclesRecord, great_circles_of
 from tankcal.record.hits import HitsRecord, hits_of
 from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.liquid import LiquidRecord, liquid_of
+from tankcal.record.long_tables import LongTables
 from tankcal.record.overrulings import (
     OverrulingsRecord,
     overrulings_of,
@@ -77,7 +78,9 @@ class Record(Saved, kw_only=True):
     files: list[InputFile] = key("everything that the job was read from")
     job: JobAsRead = key("the job as read, in SI")
     shell: survey.Wall | None = key("the wall as one body", default=None)
-    points: list[survey.SurveyedPoint] = key("of an adjusted survey every adjusted point first")
+    points: list[survey.SurveyedPoint] | None = key(
+        "of an adjusted survey every adjusted point first; null: in the file of `long_tables`"
+    )
     rejected: list[survey.RejectedPoint] = key("points that are not on the wall", default=())
     overrulings: OverrulingsRecord | None = key(
         "decisions against the search for blunders; left out where there are none",
@@ -139,6 +142,11 @@ class Record(Saved, kw_only=True):
     deliveries: list[WorstDeliveries] = key("the worst of each minimum height", default=())
     rule: statements.TableJudged | None = key("null: the job has no decision rule", default=None)
     monte_carlo: statements.MonteCarlo | None = key("null: it is off", default=None)
+    long_tables: LongTables | None = key(
+        "the file that holds tables of more than 10 000 rows; left out where there are none",
+        default=None,
+        optional=True,
+    )
 
 
 _HEAD = ("format", "tankcal", "versions", "files", "job")

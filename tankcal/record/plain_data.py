@@ -8,6 +8,7 @@ from math import isfinite
 import numpy as np
 
 from tankcal.messages import Message, as_plain
+from tankcal.record.columns import ArrayColumns, ArrayRows
 from tankcal.record.schema import keys_of
 
 _AS_THEY_ARE = {str, int, bool, type(None)}
@@ -20,7 +21,7 @@ def to_plain(value):
     ----------
     value : object
         A dataclass (see `tankcal.record.schema`), or dicts, lists, tuples and arrays of anything
-        plain, and of dataclasses.
+        plain, and of dataclasses. `ArrayColumns` and `ArrayRows` stay as they are.
     """
     kind = type(value)  # of a million values most are these two
     if kind is float:
@@ -47,6 +48,13 @@ def to_plain(value):
     if isinstance(value, float) and not isfinite(value):
         return None
     return value
+
+
+def whole(record):
+    """A record all of whose tables are lists and dicts, the long ones as well."""
+    if isinstance(record, ArrayColumns | dict):
+        return {key: whole(value) for key, value in record.items()}
+    return list(record) if isinstance(record, ArrayRows) else record
 
 
 def _object(value):

@@ -19,6 +19,8 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
+from tankcal.record.columns import Texts
+from tankcal.record.long_tables import BY_COLUMNS, long_pairs
 from tankcal.record.making import record_of, record_of_adjustment
 
 TABLE, TABLE_TOLERANCE, TOLERANCE = "capacity.", 1e-9, 1e-6
@@ -175,31 +177,32 @@ def compare_records(record, found):
     (2, 1, 'capacity.volume_m3[1]', True)
     """
     was, now = ({}, {}), ({}, {})
+    tables, record, found = long_pairs(record, found)
     _sort(record, "", "", *was)
     _sort(found, "", "", *now)
-    largest, beyond, different, count = None, [], 0, 0
     rounding = ROUNDING * _fullest(record)
+    compared = []
     for key, places in was[0].items():
         worst, changed = _worst(key, places, now[0].get(key, {}), rounding)
         if key == FACTORS and worst is not None:
             worst = _of_factors(record["capacity"], found["capacity"], worst)
-        count, different = count + len(places), different + changed
-        if worst is None:
-            continue
-        if worst.relative > worst.tolerance:
-            beyond.append(worst)
-        if largest is None or _over(worst) > _over(largest):
-            largest = worst
-    beyond.sort(key=_over, reverse=True)
+        compared.append((len(places), worst, changed))
+    of_tables = [_compare_columns(place, *pair) for place, pair in tables.items()]
+    compared += [one for numbers, _ in of_tables for one in numbers]
+    apart = [worst for _, worst, _ in compared if worst is not None]
+    beyond = sorted((one for one in apart if one.relative > one.tolerance), key=_over, reverse=True)
     same_version = record["tankcal"] == found["tankcal"]
     return Recomputation(
         made_by=_versions(record),
         computed_by=_versions(found),
-        numbers=count,
-        different=different,
-        largest=largest,
+        numbers=sum(count for count, _, _ in compared),
+        different=sum(changed for _, _, changed in compared),
+        largest=max(apart, key=_over, default=None),
         beyond=tuple(beyond),
-        otherwise=tuple(_otherwise(was, now, same_version)),
+        otherwise=(
+            *_otherwise(was, now, same_version),
+            *(one for _, others in of_tables for one in others),
+        ),
     )
 
 
@@ -262,6 +265,48 @@ def _of_factors(was, now, by_number):
         if apart:
             found.append(NumberApart(place, *numbers, relative, TABLE_TOLERANCE))
     return max(found, key=_over, default=None)
+
+
+def _compare_columns(place, was, now):
+    """What `compare_records` looks at of a long table, column by column.
+
+    was, now  `ArrayColumns`
+
+    Returns the (count, NumberApart or None, how many differ) of each column of numbers, and the
+    first (place, recorded, computed) of each column whose other values are not the same.
+    """
+    numbers, others = [], []
+    if was.count != now.count:
+        return numbers, [(f"{place}[]", str(was.count), str(now.count))]
+    for name, column in was.arrays.items():
+        where = _places_of(place, name)
+        if isinstance(column, Texts) or column.dtype == bool:
+            pairs = enumerate(zip(was[name], now[name], strict=True))
+            others += [(where(row), _shown(one), _shown(two))
+                       for row, (one, two) in pairs if one != two][:1]  # fmt: skip
+            continue
+        one, two = (np.asarray(table.arrays[name], dtype=float) for table in (was, now))
+        is_number = np.isfinite(one)
+        if one.shape != two.shape or (is_number != np.isfinite(two)).any():
+            others.append((where(0), "null or a number", "otherwise"))
+            continue
+        one, two = np.where(is_number, one, 0.0), np.where(is_number, two, 0.0)
+        apart = np.abs(one - two)
+        worst = None
+        if apart.any():
+            most = np.unravel_index(np.argmax(apart), apart.shape)
+            relative = float(apart[most] / np.abs(one).max()) if one.any() else np.inf
+            spot = where(most[0]) + "".join(f"[{i}]" for i in most[1:])
+            worst = NumberApart(spot, float(one[most]), float(two[most]), relative, TOLERANCE)
+        numbers.append((int(is_number.sum()), worst, int(np.count_nonzero(apart))))
+    return numbers, others
+
+
+def _places_of(place, name):
+    """The place of a value of a column in the record: "points[3].x_m", or by columns."""
+    if place in BY_COLUMNS:
+        return lambda row: f"{place}.{name}[{row}]"
+    return lambda row: f"{place}[{row}].{name}"
 
 
 def _worst(key, places, found, rounding):

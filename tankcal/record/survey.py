@@ -1,6 +1,6 @@
 """The part of the record that says what was measured: wall, points, sections, courses."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall_straps import mean_radii
+from tankcal.record.columns import ArrayColumns, ArrayRows, plain_if_short
 from tankcal.record.schema import Saved, filled_from, key
 from tankcal.sections import coordinates_of
 
@@ -149,22 +150,25 @@ def points_of(result):
     if result.adjustment is None:
         return rows
     of_tank = {row.point: row for row in rows}
-    adjusted = points_of_adjustment(result.adjustment)
-    names = {row.point for row in adjusted}
+    adjusted = list(points_of_adjustment(result.adjustment))
+    names = {row["point"] for row in adjusted}
+    of_target = ("x_m", "y_m", "z_m", "cov_m2")  # not of the wall behind it
     return [
-        # coordinates and covariance of the target itself, not of the wall behind it
-        replace(
-            of_tank.get(row.point, row), x_m=row.x_m, y_m=row.y_m, z_m=row.z_m, cov_m2=row.cov_m2
-        )
+        replace(of_tank[row["point"]], **{key: row[key] for key in of_target})
+        if row["point"] in of_tank
+        else SurveyedPoint(**row)
         for row in adjusted
     ] + [row for row in rows if row.point not in names]
 
 
 def points_of_adjustment(adjustment):
     """Every adjusted point with its covariance, in their order; nothing of a tank."""
-    xyz, covariances = np.asarray(adjustment.xyz_m), np.asarray(adjustment.covariance_m2)
-    rows = zip(adjustment.names, xyz.tolist(), covariances.tolist(), strict=True)
-    return [_surveyed(name, place, cov_m2=covariance) for name, place, covariance in rows]
+    xyz, count = np.asarray(adjustment.xyz_m), len(adjustment.names)
+    columns = {key.name: [None] * count for key in fields(SurveyedPoint)}
+    columns |= {"point": list(adjustment.names), "used": np.zeros(count, dtype=bool)}
+    columns |= {f"{axis}_m": xyz[:, i] for i, axis in enumerate("xyz")}
+    columns["cov_m2"] = np.asarray(adjustment.covariance_m2)
+    return plain_if_short(ArrayRows(ArrayColumns(columns)))
 
 
 def _surveyed(name, xyz, **more):

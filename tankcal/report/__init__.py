@@ -64,17 +64,15 @@ def build(record_path, directory, progress=None, language=None, letterhead=None,
         When a cell of the notebook fails or a page cannot be set; then none of the files is
         written.
     """
-    import shutil
-
     from tankcal import record as records
     from tankcal.report.notebook import joined
     from tankcal.report.paper import ReadRecord
 
     directory = Path(directory)
     beside = directory / "record.json"
+    record = records.load(record_path) if record is None else record
     if Path(record_path).resolve() != beside.resolve():
-        shutil.copyfile(record_path, beside)
-    record = records.load(beside) if record is None else record
+        records.copy_record(record, record_path, directory)
     notebook = joined(
         beside.name,
         missing(record),

@@ -9,6 +9,7 @@ from tankcal.errors import TankcalError
 _WORKBOOK = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
 KINDS = {  # name of the file: MIME type, what it is to the paper (PDF 2.0, 7.11.3)
     "record.json": ("application/json", "source"),
+    "record_tables.npz": ("application/zip", "source"),
     "capacity.xlsx": (_WORKBOOK, "data"),
     "adjustment.xlsx": (_WORKBOOK, "data"),
     "certificate.xml": ("text/xml", "alternative"),
@@ -19,8 +20,12 @@ KINDS = {  # name of the file: MIME type, what it is to the paper (PDF 2.0, 7.11
     "history.json": ("application/json", "source"),
     "history.xlsx": (_WORKBOOK, "data"),
 }
-OF_RECORD = ("record.json", "capacity.xlsx", "adjustment.xlsx", "certificate.xml")
+OF_RECORD = (
+    *("record.json", "record_tables.npz"),
+    *("capacity.xlsx", "adjustment.xlsx", "certificate.xml"),
+)
 LARGEST = 20_000_000  # bytes: a larger file stays beside the PDF, which names its digest
+LARGEST_PACKED = 5_000_000  # of long tables: the size that such a record.json has by them
 
 
 @dataclass(frozen=True)
@@ -47,8 +52,12 @@ def beside(folder, described):
     return [
         Attachment(path.name, *KINDS[path.name], described[path.name], sha256(path.read_bytes()))
         for path in paths
-        if path.is_file() and path.stat().st_size <= LARGEST
+        if path.is_file() and path.stat().st_size <= _largest(path)
     ]
+
+
+def _largest(path):
+    return LARGEST_PACKED if path.suffix == ".npz" else LARGEST
 
 
 def contents(blocks, folder):

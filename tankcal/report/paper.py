@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 
 from tankcal.record import load
-from tankcal.record.plain_data import rows_of, without_collection
+from tankcal.record.columns import as_columns
 from tankcal.report import attachments, blocks
 from tankcal.report.letterhead import read_saved
 from tankcal.report.plain import Column, PlainPaper
@@ -77,18 +77,8 @@ class Paper(PlainPaper):
 
     @cached_property
     def readings(self):
-        """Every reading of the adjustment, a dict each."""
-        with without_collection():
-            return rows_of(self.record["adjustment"]["residuals"])
-
-    @cached_property
-    def adjusted_readings(self):
-        """The readings that took part: neither set aside nor only compared, nor held."""
-        return [
-            row
-            for row in self.readings
-            if not row["removed"] and not row["check"] and row["sd"] != 0
-        ]
+        """`ArrayColumns` of every reading of the adjustment."""
+        return as_columns(self.record["adjustment"]["residuals"])
 
     # ---- blocks
 

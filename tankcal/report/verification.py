@@ -17,6 +17,8 @@ import tankcal
 from tankcal import record as records
 from tankcal.errors import InputError, Problem, TankcalError
 from tankcal.messages import Message, message
+from tankcal.record.long_tables import FILE as TABLES
+from tankcal.record.long_tables import problems_of_tables
 from tankcal.record.recomputation import Recomputation, input_folder
 from tankcal.report import dcc, outputs
 from tankcal.report.attachments import KINDS, sha256
@@ -144,6 +146,8 @@ def _results(found, folder, job, again, manifest):
     record = records.load(folder / RECORD)
     found.digest = sha256((folder / RECORD).read_bytes())
     found.compared.append(RECORD)
+    told = problems_of_tables(record)
+    found.problems += told
     beside = {name: folder / name for name in KINDS}
     for name in PDFS:
         if (folder / name).is_file():
@@ -156,9 +160,10 @@ def _results(found, folder, job, again, manifest):
     for name in PAGES:
         if (folder / name).is_file():
             _page(found, name, (folder / name).read_bytes())
-    _tables(found, folder, record)
+    if not told:
+        _tables(found, folder, record)
     _inputs(found, record, job)
-    if again is None:
+    if again is None or told:
         return
     _numbers(found, record, job, folder, again)
 
@@ -197,7 +202,7 @@ def _listed(found, folder, manifest):
         return
     there = files_below(folder)
     for name in manifest.digests:
-        if name not in there:
+        if name not in there and not found.is_told(name):
             text = message("verify_missing", "is missing; SHA256SUMS lists it")
             found.tell(name, text)
     for name in there:
@@ -231,8 +236,12 @@ def _file(found, path, job, again):
             raise InputError(Problem(path.name, text))
         return
     with tempfile.TemporaryDirectory(prefix="tankcal-") as folder:
-        (Path(folder) / RECORD).write_bytes(held[RECORD])
+        tables = held.get(TABLES) or _read(path.with_name(TABLES))
+        for name, content in ((RECORD, held[RECORD]), (TABLES, tables)):
+            if content is not None:
+                (Path(folder) / name).write_bytes(content)
         record = records.load(Path(folder) / RECORD)
+        told = problems_of_tables(record)  # reads them while they are there
     for name in WORKBOOKS:
         if name in held:
             _workbook(found, f"{path.name}: {name}", held[name])
@@ -240,8 +249,20 @@ def _file(found, path, job, again):
         _certificate(found, f"{path.name}: {dcc.FILE}", held[dcc.FILE], record)
     if job:
         _inputs(found, record, job)
-        if again is not None:
+        if told and again is not None:
+            _note_missing_tables(found)
+        elif again is not None:
             _numbers(found, record, job, None, again)
+
+
+def _note_missing_tables(found):
+    found.note(
+        message(
+            "verify_tables_not_inside",
+            "the long tables of the record are neither inside the PDF nor beside it: nothing was "
+            "computed again; verify the folder of the results",
+        )
+    )
 
 
 def _read(path):

@@ -6,6 +6,7 @@ from pathlib import Path
 from tankcal.errors import InputError, TankcalError
 from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.messages import message
+from tankcal.record import long_tables
 from tankcal.report import LETTERHEAD
 from tankcal.report import manifest as manifests
 
@@ -81,7 +82,7 @@ def make_papers_again(found, folder, manifest, rebuild):
         found.papers_again = True
         names = sorted({*manifests.files_below(folder), *manifests.files_below(again)})
         for name in names:
-            if name in (COVARIANCE_FILE, found.saved_file):
+            if name in (COVARIANCE_FILE, long_tables.FILE, found.saved_file):
                 continue  # copied: neither is made of the other
             if not (again / name).is_file() or not (Path(folder) / name).is_file():
                 continue  # the manifest tells of what is missing or extra

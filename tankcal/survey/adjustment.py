@@ -28,7 +28,7 @@ from tankcal.survey.network.reactions import reactions
 from tankcal.survey.network.soundness import find_hardly_determined
 from tankcal.survey.network.survey import IMAGES
 from tankcal.survey.network_of_survey import gather, held_trace, named_in
-from tankcal.survey.results import Adjustment
+from tankcal.survey.results import Adjustment, Readings
 from tankcal.survey.rows import gone_with_their_points, readings_of
 from tankcal.survey.start.unstarted import SeveralPlacesError
 from tankcal.survey.start_values import add_start_values, mirrored_targets, started_like
@@ -132,10 +132,10 @@ def _complete(search, gathered, frame, measurements):
     held = reactions(adjusted.problem, adjusted.solution, frame.tested & ~gathered.idle)
     of_held = held_trace(gathered.known, adjusted.survey.points)
     readings, groups = readings_of(adjusted, held.residuals(adjusted.problem), of_held)
-    readings += gone_with_their_points(adjusted, search.removed)
-    removed = sorted((one for one in readings if one.removed), key=lambda one: -abs(one.w))
-    readings += check_readings(adjusted, gathered.checks, scale)
-    readings = _in_order(readings)
+    gone = gone_with_their_points(adjusted, search.removed)
+    removed = sorted([*readings.where(readings.removed), *gone], key=lambda one: -abs(one.w))
+    checks = check_readings(adjusted, gathered.checks, scale)
+    readings = _in_order(Readings.joined([readings, Readings.of([*gone, *checks])]))
     there = np.flatnonzero(np.isfinite(adjusted.xyz_m).all(axis=1))
     late = {i: why for i, why in enumerate(adjusted.problem.set_aside) if why}
     warnings += [_lost(measurements, adjusted.survey.points[i], why) for i, why in late.items()]
@@ -164,7 +164,7 @@ def _complete(search, gathered, frame, measurements):
         adjusted=adjusted,
         there=there,
         aside=(*gathered.aside, *late.values()),
-        readings=tuple(readings),
+        readings=readings,
         removed=tuple(removed),
         groups=groups,
         datum=frame.report,
@@ -245,12 +245,13 @@ def _causes(adjusted, readings, gathered, measurements, diagnoses):
 
 def _in_order(readings):
     """Readings by file, then row, in the order in which they stand there."""
-    files = {one.file for one in readings}
+    places = readings.columns["file"].tolist()
+    files = set(places)
     files = [one for one in FILES if one in files] + sorted(files - set(FILES))
     rank = {name: i for i, name in enumerate(files)}
-    of = np.array([rank[one.file] for one in readings])
-    row = np.array([-1 if one.row is None else one.row for one in readings])
-    return [readings[i] for i in np.lexsort((row, of)).tolist()]
+    of = np.array([rank[file] for file in places])
+    row = np.array([-1 if row is None else row for row in readings.columns["row"].tolist()])
+    return readings.where(np.lexsort((row, of)))
 
 
 def _cov_scale(adjusted, settings):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tankcal.messages import Message
+from tankcal.survey.adjusted_readings import Reading, Readings
 from tankcal.text.digits import fixed
 from tankcal.text.display import table_html
 
@@ -15,65 +16,6 @@ if TYPE_CHECKING:
     from tankcal.survey.network import Adjusted
 
 _SHOWN = 20  # points that an adjustment shows of itself
-
-
-@dataclass(frozen=True)
-class Reading:
-    """One value of one observation after the adjustment.
-
-    Attributes
-    ----------
-    kind : str
-        As the observations name it: "image coordinate", "distance", "direction", ...
-    ids : tuple
-        Names, such as ("photo 1", "215") or ("A", "B").
-    element : str
-        "x" or "y", "omega", ...; "" where there is only one.
-    file, row
-        Where it was read; of averaged readings the first row; "" and None: no file.
-    repeats : int
-        Readings that were averaged.
-    unit : str
-        Of value, residual, sd, mdb: "mm" (images), "m", "rad" or "" (weighted unknowns).
-    value : float
-        Observed, as adjusted (after averaging and corrections).
-    residual : float
-        Computed minus observed.
-    sd : float
-        A priori.
-    redundancy : float
-        0 to 1.
-    w : float
-        Baarda's test quantity.
-    tau : float
-        Pope's: w over sigma0 (nan: no redundancy).
-    mdb : float
-        Minimal detectable bias; inf: nothing controls it.
-    effect_m : float
-        Largest change of a point's coordinates by an undetected bias of that size; inf as well.
-    removed : bool
-        True: set aside by data snooping; residual and w are then those that it would have.
-    check : bool
-        True: it was only compared; w is then its difference over the sd of that.
-    """
-
-    kind: str
-    ids: tuple
-    element: str
-    file: str
-    row: int | None
-    repeats: int
-    unit: str
-    value: float
-    residual: float
-    sd: float
-    redundancy: float
-    w: float
-    tau: float
-    mdb: float
-    effect_m: float
-    removed: bool = False
-    check: bool = False
 
 
 @dataclass(frozen=True)
@@ -276,8 +218,8 @@ class Adjustment:
         Numbers of the points that could be adjusted.
     aside : tuple of str
         Sentences: points that could not be adjusted, and why.
-    readings : tuple of Reading
-        In the order of the files.
+    readings : Readings
+        A sequence of `Reading`, in the order of the files.
     removed : tuple of Reading
         Those that were set aside, the worst first.
     groups : tuple of GroupOfReadings
@@ -302,7 +244,7 @@ class Adjustment:
     adjusted: "Adjusted"
     there: np.ndarray
     aside: tuple
-    readings: tuple[Reading, ...]
+    readings: Readings
     removed: tuple[Reading, ...]
     groups: tuple[GroupOfReadings, ...]
     datum: DatumReport

@@ -1,18 +1,16 @@
 """Every value of every observation after the adjustment, by the names that the user gave."""
 
-from itertools import repeat
-
 import numpy as np
 
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.survey.network.reactions import HELD
 from tankcal.survey.network.reliability import UNCONTROLLED
 from tankcal.survey.observations import NUISANCES
-from tankcal.survey.results import GroupOfReadings, Reading
+from tankcal.survey.results import GroupOfReadings, Reading, Readings
 
 
 def readings_of(adjusted, held, held_trace):
-    """Reading rows in the order of the tables, and a GroupOfReadings for each kind and name.
+    """Readings in the order of the tables, and a GroupOfReadings for each kind and name.
 
     adjusted    network.Adjusted
     held        network.Residuals of held coordinates: rows of no group, for they are not observed
@@ -29,16 +27,17 @@ def readings_of(adjusted, held, held_trace):
             continue
         rows = table.rows.tolist()
         units = _units(table, trace)
-        found += _rows(
-            table, np.reshape(value, table.residual.shape), trace, units, adjusted.sigma0
-        )
+        value = np.reshape(value, table.residual.shape)
+        found.append(_rows(table, value, trace, units, adjusted.sigma0))
         if table.source == HELD:
             continue
-        names = np.array([trace.group[i] for i in rows], dtype=object)
+        names, units = _objects(trace.group[i] for i in rows), _objects(units)
         for name, unit in dict.fromkeys(zip(names, units, strict=True)):
-            mine = (names == name) & (np.array(units, dtype=object) == unit)
+            mine = (names == name) & (units == unit)
             groups.setdefault((table.kind, name, unit), []).append((table, mine))
-    return found, tuple(_group(*key, parts, adjusted.survey) for key, parts in groups.items())
+    return Readings.joined(found), tuple(
+        _group(*key, parts, adjusted.survey) for key, parts in groups.items()
+    )
 
 
 def gone_with_their_points(adjusted, removed):
@@ -75,25 +74,37 @@ def _observed(survey, table, held_trace):
 
 
 def _rows(table, value, trace, units, sigma0):
-    """Reading rows of a table of residuals, value by value."""
+    """Readings of a table of residuals, value by value."""
     rows, width = table.rows.tolist(), value.shape[1]
     tau = table.w / sigma0 if sigma0 > 0 else np.full_like(table.w, np.nan)
-    numbers = (
-        value, table.residual, table.sd, table.redundancy, table.w, tau, table.mdb, table.effect_m
-    )  # fmt: skip
+    numbers = {
+        "value": value, "residual": table.residual, "sd": table.sd,
+        "redundancy": table.redundancy, "w": table.w, "tau": tau, "mdb": table.mdb,
+        "effect_m": table.effect_m,
+    }  # fmt: skip
 
     def each(values):
-        return [value for value in values for _ in range(width)]
+        return np.repeat(_objects(values), width)
 
-    return list(
-        map(
-            Reading,
-            repeat(table.kind), each(trace.ids[i] for i in rows),
-            [name for i in rows for name in trace.element[i]], repeat(trace.file),
-            each(trace.rows[i] for i in rows), each(int(trace.repeats[i]) for i in rows),
-            each(units), *(np.ravel(a).tolist() for a in numbers), each((~table.used).tolist()),
-        )
-    )  # fmt: skip
+    return Readings(
+        {
+            "kind": each([table.kind] * len(rows)),
+            "ids": each(trace.ids[i] for i in rows),
+            "element": _objects(name for i in rows for name in trace.element[i]),
+            "file": each([trace.file] * len(rows)),
+            "row": each(trace.rows[i] for i in rows),
+            "repeats": each(trace.repeats[i] for i in rows).astype(int),
+            "unit": each(units),
+            **{name: np.ravel(one).astype(float) for name, one in numbers.items()},
+            "removed": np.repeat(~table.used, width),
+            "check": np.zeros(width * len(rows), dtype=bool),
+        }
+    )
+
+
+def _objects(values):
+    """(n,) array of objects, tuples among them."""
+    return np.fromiter(values, dtype=object)
 
 
 def _units(table, trace):

@@ -95,8 +95,9 @@ def _adjustment_in_language(words, adjustment):
     left_out = [_said(words, one, "text") for one in adjustment.get("left_out", [])]
     places = {}
     if residuals := adjustment.get("residuals"):  # by columns
-        said = {one: _place_said(words, one) for one in set(residuals["file"])}
-        places["residuals"] = {**residuals, "file": [said[one] for one in residuals["file"]]}
+        files = residuals["file"]
+        said = {one: _place_said(words, one) for one in set(files)}
+        places["residuals"] = residuals | {"file": [said[one] for one in files]}
     if held := adjustment.get("held"):
         places["held"] = [_placed(words, one) for one in held]
     return {

@@ -29,7 +29,7 @@ from tankcal.report import certificate
 from tankcal.report.paper import Paper
 from tankcal.survey.diagnosis.scales import check_readings_off, scale_of_control
 from tankcal.survey.measurements import Setup
-from tankcal.survey.results import Reading
+from tankcal.survey.results import Reading, Readings
 from tankcal.text.shipped import shipped_folder
 from tankcal.text.words import load_words
 
@@ -440,7 +440,8 @@ def of_control(factor, readings=(), sd_m=0.0):
         covariance_m2=lambda points: np.diag(3 * [0.0] + 3 * [sd_m**2]),
     )
     setups = (Setup("S1", "A"),)
-    return scale_of_control(adjusted, readings, SimpleNamespace(control=table, setups=setups))
+    measurements = SimpleNamespace(control=table, setups=setups)
+    return scale_of_control(adjusted, Readings.of(readings), measurements)
 
 
 def test_two_control_points_reveal_a_scale_error():
@@ -462,11 +463,13 @@ def test_lengths_within_their_sds_give_no_warning():
 
 def test_check_reading_against_the_scale_is_reported():
     off = reading("distance", ("P1", "P5"), 6.44, 0.0069, check=True)
-    (line,) = check_readings_off([off, reading("distance", ("P1", "P5"), 6.44, 0.002, check=True)])
+    close = reading("distance", ("P1", "P5"), 6.44, 0.002, check=True)
+    (line,) = check_readings_off(Readings.of([off, close]))
     assert (line.file, line.row, line.expected.code) == (
         "slope_distances.csv", 7, "check_reading_off",
     )  # fmt: skip
-    assert check_readings_off([reading("distance", ("P1", "P5"), 6.44, 0.0069)]) == []
+    adjusted = reading("distance", ("P1", "P5"), 6.44, 0.0069)
+    assert check_readings_off(Readings.of([adjusted])) == []
 
 
 # ---- the table

@@ -139,15 +139,17 @@ def _interior(adjustment, setup):
 def _images(adjustment, setup):
     names = adjustment.adjusted.survey.photos.names
     own = {names[i] for i in _own_photos(adjustment, setup)}
-    readings = [
-        one
-        for one in adjustment.readings
-        if one.kind == "image coordinate" and one.ids[0] in own and not (one.removed or one.check)
-    ]
-    if not readings:
+    readings = adjustment.readings
+    readings = readings.where(
+        readings.are("image coordinate") & ~readings.removed & ~readings.check
+    )
+    readings = readings.where(
+        np.array([ids[0] in own for ids in readings.columns["ids"]], dtype=bool)
+    )
+    if not len(readings):
         return None
-    residual = np.array([one.residual for one in readings])
-    is_x = np.array([one.element == "x" for one in readings])
+    residual = readings.columns["residual"]
+    is_x = readings.columns["element"] == "x"
     worst = readings[int(np.abs(residual).argmax())]
     rms = np.array([np.sqrt(np.mean(residual[one] ** 2)) for one in (is_x, ~is_x)])
     pixel = None if setup.pixel_mm is None else np.broadcast_to(setup.pixel_mm, 2)

@@ -11,6 +11,7 @@ from tankcal import report
 from tankcal.errors import InputError, Problem, TankcalError, VocabularyError
 from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.messages import message
+from tankcal.record import long_tables
 from tankcal.record.plain_data import without_collection
 from tankcal.report import dcc, folders, manifest
 from tankcal.report.attachments import sha256
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
 RECORD = "record.json"
 WORKBOOKS = ("capacity.xlsx", "adjustment.xlsx")
 FILES = (
-    *(RECORD, *tables.FILES, *WORKBOOKS, dcc.FILE, *report.FILES, report.LETTERHEAD),
-    manifest.FILE,
+    *(RECORD, long_tables.FILE, *tables.FILES, *WORKBOOKS, dcc.FILE),
+    *(*report.FILES, report.LETTERHEAD, manifest.FILE),
 )
 
 
@@ -106,9 +107,10 @@ def rebuild(record_path, directory, progress=None, language=None, letterhead=Non
     record = records.load(source)
 
     def prepare(folder):
-        for path in (source, source.with_name(COVARIANCE_FILE)):
-            if path.exists():
-                shutil.copyfile(path, folder / (RECORD if path == source else path.name))
+        records.copy_record(record, source, folder)
+        covariance = source.with_name(COVARIANCE_FILE)
+        if covariance.exists():
+            shutil.copyfile(covariance, folder / covariance.name)
         return record
 
     try:

@@ -1,29 +1,34 @@
 """Tables as CSV files, column by column: a survey may have 200 000 readings."""
 
 import csv
+import io
 from math import isnan
 
+import numpy as np
+
+from tankcal.record.columns import ArrayColumns, Texts, values_of
 from tankcal.report import numbers
 
 FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
+BLOCK = 10_000  # rows whose cells are texts at one time
 _YES = {True: "yes", False: "no"}
 
 
 def write_table(table, path, rows):
     """Write a declared Table with its headings.
 
-    rows  dicts, or {key: values}; a column that none of them knows is left out
+    rows  dicts, {key: values} or `ArrayColumns`; a column that none of them knows is left out
     """
-    values_of = rows if isinstance(rows, dict) else _by_keys(rows)
+    if isinstance(rows, ArrayColumns):
+        values_of = rows.arrays
+    else:
+        values_of = rows if isinstance(rows, dict) else _by_keys(rows)
     columns = {}
     for column in table.in_csv():
         if column.key not in values_of:
             continue
         cells = _plain(values_of[column.key], numbers.unit(column.csv_unit).factor)
-        if any(isinstance(cell, list) for cell in cells):
-            columns |= _spread(column.csv, cells)
-        else:
-            columns[column.csv] = cells
+        columns |= _spread(column.csv, cells)
     write_csv(columns, path, table.csv_style)
 
 
@@ -34,6 +39,12 @@ def _by_keys(rows):
 
 def _plain(values, factor):
     """The values in another unit; yes and no for True and False."""
+    if isinstance(values, Texts):
+        return values
+    if isinstance(values, np.ndarray):
+        if values.dtype == bool:
+            return Texts(values.astype(np.intp), ("no", "yes"))
+        return values if factor == 1.0 or values.dtype.kind != "f" else factor * values
     types = set(map(type, values))
     if bool in types:
         return [_YES.get(value, value) for value in values]
@@ -42,11 +53,17 @@ def _plain(values, factor):
     return [None if value is None else factor * value for value in values]
 
 
-def _spread(heading, lists):
-    """Lists of one or more as columns of their own: id_1, id_2."""
-    width = max(map(len, lists), default=0)
-    padded = ([*one, *[""] * (width - len(one))] for one in lists)
-    return {f"{heading}_{i}": list(cells) for i, cells in enumerate(zip(*padded, strict=True), 1)}
+def _spread(heading, cells):
+    """A column; lists of one or more as columns of their own: id_1, id_2."""
+    if isinstance(cells, Texts) and cells.codes.ndim > 1:
+        each = [Texts(codes, cells.texts) for codes in cells.codes.T]
+    elif not isinstance(cells, list) or not any(isinstance(cell, list) for cell in cells):
+        return {heading: cells}
+    else:
+        width = max(map(len, cells), default=0)
+        padded = ([*one, *[""] * (width - len(one))] for one in cells)
+        each = map(list, zip(*padded, strict=True))
+    return {f"{heading}_{i}": one for i, one in enumerate(each, 1)}
 
 
 def write_rows(rows, path):
@@ -69,18 +86,31 @@ def _safe(value):
 
 def write_csv(columns, path, style):
     """Write {heading: cells}; `style` ("%.6f") is that of numbers, "" for none."""
-    cells = [_texts(list(values), style) for values in columns.values()]
+    columns = {heading: _cells(values) for heading, values in columns.items()}
+    count = len(next(iter(columns.values()), ()))
     with open(path, "w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(zip(*cells, strict=True))
+        file.write(",".join(map(_quoted, columns)) + "\n")
+        for start in range(0, count, BLOCK):
+            cells = [_texts(one[start : start + BLOCK], style) for one in columns.values()]
+            file.write("\n".join(map(",".join, zip(*cells, strict=True))) + "\n")
+
+
+def _cells(values):
+    """A column as numbers, or an array of texts as they are written."""
+    if isinstance(values, Texts):
+        return values.mapped(_quoted).filled("")
+    return values if isinstance(values, np.ndarray) else list(values)
 
 
 def _texts(values, style):
     """The cells of a column: of floats as `style` says, of nothing empty, of all else its text."""
+    if isinstance(values, np.ndarray):
+        if values.dtype == object:
+            return values.tolist()
+        values = values_of(values)
     types = set(map(type, values))
-    if types <= {str, int}:
-        return values
+    if types <= {int}:
+        return list(map(str, values))
     if types <= {float, type(None)}:
         return ["" if x is None or x != x else style % x for x in values]
     return [_text(value, style) for value in values]
@@ -91,4 +121,13 @@ def _text(value, style):
         return ""
     if isinstance(value, float):
         return "" if isnan(value) else style % value
-    return value
+    return _quoted(str(value))
+
+
+def _quoted(text):
+    """A text as a cell, in quotation marks where it must."""
+    if text.isalnum():
+        return text
+    line = io.StringIO()
+    csv.writer(line, lineterminator="\n").writerow((text, ""))
+    return line.getvalue().removesuffix(",\n")

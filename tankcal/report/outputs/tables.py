@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.job.covariance import MAX_POINTS
+from tankcal.record.columns import count_rows
 from tankcal.report.outputs.csv_files import write_table
 from tankcal.report.tables import (
     capacity,
@@ -37,7 +38,10 @@ FILES = (
 
 def write_tables(record, directory):
     """Write every table of the record that has rows, as CSV."""
-    tables = {"points": (survey.POINTS, None), "sections": (tank.SECTIONS, None)}
+    tables = {
+        "points": (survey.POINTS, survey.point_columns(record)),
+        "sections": (tank.SECTIONS, None),
+    }
     if record.get("strapping"):
         tables["strapping"] = strapping.straps_of(record), None
     if record.get("great_circles"):
@@ -61,7 +65,7 @@ def write_tables(record, directory):
         }
     for name, (table, columns) in tables.items():
         rows = table.rows(record) if columns is None else columns
-        if rows and (columns is None or len(next(iter(columns.values())))):
+        if len(rows) and (columns is None or count_rows(columns)):
             write_table(table, directory / f"{name}.csv", rows)
 
 

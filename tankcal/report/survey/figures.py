@@ -20,6 +20,8 @@ from tankcal.pipeline.plots import (
     set_margins,
     styled,
 )
+from tankcal.record.columns import as_columns
+from tankcal.report.survey.readings import adjusted
 from tankcal.text.labels import MARK, Label, write_labels
 
 MOST_PHOTOS = 12
@@ -34,14 +36,15 @@ _MARKS = {"control": ("^", INK), "check": ("s", "#6b4c9a"), "station": ("D", "#2
 
 def plan_factor(paper):
     """How many times larger than the plan its ellipses are drawn: 1, 2 or 5 times 10^n."""
-    points = paper.record["adjustment"]["points"]
-    largest = max((one["ellipse_m"][0] for one in points), default=0.0)
+    points = as_columns(paper.record["adjustment"]["points"])
+    largest = points.arrays["ellipse_m"][:, 0].max() if points.count else 0.0
     return round_factor(LARGEST_ELLIPSE * _extent(paper) / largest) if largest > 0 else 1
 
 
 def _places(paper):
     """{point: (x, y)}, m."""
-    return {row["point"]: (row["x_m"], row["y_m"]) for row in paper.record["points"]}
+    points = as_columns(paper.record["points"])
+    return dict(zip(points["point"], zip(points["x_m"], points["y_m"], strict=True), strict=True))
 
 
 def _extent(paper):
@@ -60,8 +63,8 @@ def plan_name(paper):
 def plan(paper):
     """The network from above: points with their error ellipses, stations, photos, distances."""
     adjustment, places = paper.record["adjustment"], _places(paper)
-    points = adjustment["points"]
-    xy = np.array([places[one["point"]] for one in points])
+    points = as_columns(adjustment["points"])
+    xy = np.array([places[name] for name in points["point"]])
     origin = np.floor(xy.min(axis=0) / 1000) * 1000 if np.abs(xy).max() > 1e5 else np.zeros(2)
     factor, extent = plan_factor(paper), _extent(paper)
     figure = Figure(figsize=(WIDTH, 4.6))
@@ -82,7 +85,7 @@ def plan(paper):
     labels = _names(points, xy - origin, factor, extent)
     labels += _photo_names(adjustment["photos"], photos)
     marks = np.vstack([xy - origin, photos])
-    largest = factor * np.array([one["ellipse_m"][0] for one in points])
+    largest = factor * points.arrays["ellipse_m"][:, 0]
     ellipses = 0.75 * _on_page(largest, extent)
     room = np.maximum([*ellipses, *(0.0 for _ in photos)], MARK)
     write_labels(ax, labels, marks, size=6, room=room, color=GREY, zorder=5, bbox=_BEHIND)
@@ -91,9 +94,9 @@ def plan(paper):
 
 def _ellipses(ax, points, xy, factor):
     """Error ellipses, of very many points those of the weakest."""
-    axes = np.array([one["ellipse_m"] for one in points])
+    axes = points.arrays["ellipse_m"]
     weakest = np.argsort(-axes[:, 0], kind="stable")[:MANY]
-    turn = 90 - np.array([points[i]["ellipse_azimuth_deg"] for i in weakest])
+    turn = 90 - points.arrays["ellipse_azimuth_deg"][weakest]
     size = 2 * factor * axes[weakest]
     ellipses = EllipseCollection(
         size[:, 0], size[:, 1], turn, units="xy", offsets=xy[weakest], transOffset=ax.transData,
@@ -112,10 +115,10 @@ def _lines(ax, paper, places, origin):
     setups = paper.record["adjustment"]["setups"]
     station = {one["setup"]: one["station"] for one in setups}
     ends = set()
-    for row in paper.readings:
-        if row["kind"] not in ("image coordinate", "plumb line") and len(row["ids"]) > 1:
-            start = station.get(row["ids"][0], row["ids"][0])
-            ends.add((start, row["ids"][-1]))
+    drawn = ~_are_of(paper.readings, "image coordinate", "plumb line")
+    for ids in paper.readings.take(drawn)["ids"]:
+        if len(ids) > 1:
+            ends.add((station.get(ids[0], ids[0]), ids[-1]))
     ends = {pair for pair in ends if pair[0] in places and pair[1] in places}
     if len(ends) > MANY:
         return
@@ -127,11 +130,17 @@ def _lines(ax, paper, places, origin):
         )  # fmt: skip
 
 
+def _are_of(readings, *kinds):
+    """(n,) whether readings are of these kinds."""
+    found = readings.arrays["kind"]
+    return np.array([kind in kinds for kind in found.texts], dtype=bool)[found.codes]
+
+
 def _marks(ax, paper, points, xy):
-    kinds = np.array([one["kind"] for one in points])
+    kinds = np.array(points["kind"])
     plain = kinds == "point"
     ax.plot(*xy[plain].T, ".", color=GREY, markersize=2, zorder=3,
-            label=paper.word("plan.point"), **rasterize_many(points))  # fmt: skip
+            label=paper.word("plan.point"), **rasterize_many(xy[plain]))  # fmt: skip
     for kind, (mark, colour) in _MARKS.items():
         own = kinds == kind
         if own.any():
@@ -150,12 +159,13 @@ def _names(points, xy, factor, extent_m):
     Those of stations, control and check points find their places first.
     """
     middle = xy.mean(axis=0)
-    groups = _at_one_place(points, xy, SAME_PLACE * extent_m)
-    groups.sort(key=lambda numbers: all(points[n]["kind"] == "point" for n in numbers))
+    kinds, all_names = points["kind"], points["point"]
+    groups = _at_one_place(kinds, xy, SAME_PLACE * extent_m)
+    groups.sort(key=lambda numbers: all(kinds[n] == "point" for n in numbers))
     found = []
     for numbers in groups:
-        names = [points[n]["point"] for n in numbers]
-        ellipse = factor * max(points[n]["ellipse_m"][0] for n in numbers)
+        names = [all_names[n] for n in numbers]
+        ellipse = factor * points.arrays["ellipse_m"][numbers, 0].max()
         clear = 3 + 0.75 * _on_page(ellipse, extent_m)
         forms = tuple(_shortened(names, most) for most in (MOST_AT_A_PLACE, 1))
         away = tuple(np.sign(xy[numbers[0]] - middle) + 1e-3 * (xy[numbers[0]] - middle))
@@ -169,7 +179,7 @@ def _shortened(names, most):
     return ", ".join([*names[:most], *more])[:60]
 
 
-def _at_one_place(points, xy, near):
+def _at_one_place(kinds, xy, near):
     """Lists of the numbers of points that share a name tag; of too many places the stations."""
     groups, places = [], np.zeros((0, 2))
     for number, place in enumerate(xy):
@@ -177,7 +187,7 @@ def _at_one_place(points, xy, near):
         if len(away) and away.min() < near:
             groups[int(away.argmin())].append(number)
         elif len(groups) == MOST_NAMES:
-            return [[n] for n, one in enumerate(points) if one["kind"] == "station"]
+            return [[n] for n, kind in enumerate(kinds) if kind == "station"]
         else:
             groups.append([number])
             places = np.vstack([places, place])
@@ -202,9 +212,9 @@ def _photo_names(photos, xy):
 @styled
 def distributions(paper):
     """Histogram of w against the normal distribution, and of the redundancy numbers."""
-    rows = paper.adjusted_readings
-    w = np.array([row["w"] for row in rows if row["controlled"] and row["w"] is not None])
-    redundancy = np.array([row["redundancy"] for row in rows if row["redundancy"] is not None])
+    found = adjusted(paper).arrays
+    w = found["w"][found["controlled"] & np.isfinite(found["w"])]
+    redundancy = found["redundancy"][np.isfinite(found["redundancy"])]
     figure = Figure(figsize=(WIDTH, 2.5))
     left, right = figure.subplots(1, 2)
     edges = np.arange(-5, 5.01, 0.5 if len(w) < 400 else 0.25)
@@ -296,20 +306,29 @@ def _half(paper):
 
 def image_residuals(paper):
     """{photo: (xy (n, 2), residuals (n, 2), xy set aside (m, 2))}, mm, of the photos shown."""
-    found = {one["photo"]: {} for one in shown_photos(paper)}
-    for row in paper.readings:
-        if row["kind"] != "image coordinate" or row["check"] or row["ids"][0] not in found:
-            continue
-        photo, point = row["ids"][:2]
-        reading = found[photo].setdefault((point, row["row"]), [0.0, 0.0, 0.0, 0.0, True])
-        axis = "xy".index(row["element"])
-        reading[axis], reading[2 + axis] = row["value"], row["residual"] or 0.0
-        reading[4] = reading[4] and not row["removed"]
-    arrays = {
-        photo: np.array([*readings.values()]).reshape(-1, 5) for photo, readings in found.items()
-    }
-    used = {photo: array[:, 4] > 0 for photo, array in arrays.items()}
-    return {
-        photo: (array[used[photo], :2], array[used[photo], 2:4], array[~used[photo], :2])
-        for photo, array in arrays.items()
-    }
+    wanted = [one["photo"] for one in shown_photos(paper)]
+    readings = paper.readings
+    readings = readings.take(_are_of(readings, "image coordinate") & ~readings.arrays["check"])
+    ids = readings.arrays["ids"]
+    photo = np.array([wanted.index(name) if name in wanted else -1 for name in ids.texts])
+    photo = photo[ids.codes[:, 0]]
+    readings, photo = readings.take(photo >= 0), photo[photo >= 0]
+    return {name: _of_photo(readings.take(photo == i)) for i, name in enumerate(wanted)}
+
+
+def _of_photo(readings):
+    """Of the readings of one photo: image points, residuals, those that were set aside."""
+    found = readings.arrays
+    keys = np.column_stack([found["ids"].codes[:, 1], found["row"]])
+    _, first, point = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    order = np.empty(len(first), dtype=int)
+    order[np.argsort(first)] = np.arange(len(first))
+    point = order[point.ravel()]
+    is_y = np.array([text == "y" for text in found["element"].texts], dtype=bool)
+    axis = is_y[found["element"].codes].astype(int)
+    values, residuals = np.zeros((2, len(first), 2))
+    values[point, axis] = found["value"]
+    residuals[point, axis] = np.nan_to_num(found["residual"])
+    aside = np.zeros(len(first), dtype=bool)
+    aside[point[found["removed"]]] = True
+    return values[~aside], residuals[~aside], values[aside]

@@ -1,13 +1,19 @@
 """Single readings: those set aside, those that fit worst, those that nothing controls."""
 
-from heapq import nlargest
+import numpy as np
 
-from tankcal.record.plain_data import columns_of, rows_of
+from tankcal.record.columns import ArrayRows
 from tankcal.report.survey.common import MOST_ROWS, with_note
 from tankcal.report.tables.readings import READINGS, in_their_units
 
 WORST = 16  # rows of a table of the worst readings
 WEAK = 0.1  # redundancy number below which a blunder has to be 13 sds to be found
+
+
+def adjusted(paper):
+    """`ArrayColumns` of readings that took part: neither set aside nor only compared, nor held."""
+    found = paper.readings.arrays
+    return paper.readings.take(~found["removed"] & ~found["check"] & (found["sd"] != 0))
 
 
 def held(paper):
@@ -24,7 +30,7 @@ def table(paper, name, rows, **values):
     """The table of readings of that name, cut to the first MOST_ROWS."""
     if not rows:
         return []
-    shown = rows_of(in_their_units(columns_of(rows[:MOST_ROWS])))
+    shown = list(in_their_units(rows[:MOST_ROWS]).rows())
     return with_note(paper, paper.show(READINGS, shown, on=name, **values), shown, rows)
 
 
@@ -35,17 +41,28 @@ def removed(paper):
 
 def largest(paper):
     """Readings with the largest w of those that were adjusted."""
-    rows = paper.adjusted_readings
-    controlled = [row for row in rows if row["controlled"] and row["w"] is not None]
-    return nlargest(WORST, controlled, key=lambda row: abs(row["w"]))
+    return _first(_controlled(paper), "w")
+
+
+def _controlled(paper):
+    """Of the readings that took part those that others control."""
+    found = adjusted(paper)
+    return found.take(found.arrays["controlled"])
+
+
+def _first(found, key):
+    """The WORST readings with the largest size of `key`, where they have one."""
+    size = np.abs(found.arrays[key])
+    known = np.flatnonzero(np.isfinite(size))
+    return list(found.take(known[np.argsort(-size[known], kind="stable")[:WORST]]).rows())
 
 
 def control(paper):
     """What nothing controls, and where an undetected blunder would do most."""
-    a, rows = paper.record["adjustment"], paper.adjusted_readings
-    alone = [row for row in rows if not row["controlled"]]
-    numbers_of = [row["redundancy"] for row in rows if row["controlled"]]
-    found = table(paper, "uncontrolled", alone, count=len(alone), all=len(rows))
+    a, every = paper.record["adjustment"], adjusted(paper)
+    alone = ArrayRows(every.take(~every.arrays["controlled"]))
+    numbers_of = _controlled(paper)["redundancy"]
+    found = table(paper, "uncontrolled", alone, count=len(alone), all=every.count)
     if not alone and numbers_of:
         smallest, largest, mean = (
             paper.number(value, digits=2)
@@ -60,20 +77,13 @@ def control(paper):
     return found + table(
         paper,
         "weakest_readings",
-        _weakest(paper),
+        _first(_controlled(paper), "effect_m"),
         power=paper.percent(a["power"]),
         alpha=paper.percent(a["alpha"]),
     )
 
 
-def _weakest(paper):
-    """Readings whose undetected bias would move a point most."""
-    rows = paper.adjusted_readings
-    felt = [row for row in rows if row["controlled"] and row["effect_m"] is not None]
-    return nlargest(WORST, felt, key=lambda row: row["effect_m"])
-
-
 def compared(paper):
     """Readings that were only compared, the largest difference in its sd first."""
-    checks = [row for row in paper.readings if row["check"]]
+    checks = paper.readings.take(paper.readings.arrays["check"]).rows()
     return sorted(checks, key=lambda row: -abs(row["w"] or 0.0))

@@ -1,7 +1,8 @@
 """What was found: points, check points, cameras, photographs, instruments, systems."""
 
-from heapq import nlargest
+import numpy as np
 
+from tankcal.record.columns import ArrayRows, as_columns
 from tankcal.report import blocks
 from tankcal.report.survey.common import MOST_CAMERAS, MOST_ROWS, with_note
 from tankcal.report.survey.images import images
@@ -61,16 +62,17 @@ def precision(paper):
 def points(paper):
     """Tables of the adjusted points, the weakest first, cut to MOST_ROWS."""
     record = paper.record
-    points = record["adjustment"]["points"]
-    weakest = nlargest(MOST_ROWS, points, key=lambda one: one["quadratic_sd_m"])
-    places = {row["point"]: row for row in record["points"]}
-    shown = point_rows(record, [places[one["point"]] for one in weakest])
+    points, adjusted = as_columns(record["points"]), as_columns(record["adjustment"]["points"])
+    weakest = np.argsort(-adjusted.arrays["quadratic_sd_m"], kind="stable")[:MOST_ROWS]
+    place = {name: i for i, name in enumerate(points["point"])}
+    names = adjusted.take(weakest)["point"]
+    shown = point_rows(record, ArrayRows(points.take([place[name] for name in names])))
     if not record["adjustment"]["photos"]:
         shown = [{key: value for key, value in row.items() if key != "rays"} for row in shown]
     precision = record["adjustment"]["precision"]
     probability = paper.percent(precision["ellipse_probability"]) if precision else ""
     block = paper.show(POINTS, shown, on="weakest_points", probability=probability)
-    return with_note(paper, block, shown, points)
+    return with_note(paper, block, shown, record["adjustment"]["points"])
 
 
 def check_points(paper):

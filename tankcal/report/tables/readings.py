@@ -1,6 +1,8 @@
 """Tables of what was observed: groups of observations, and each reading with its residual."""
 
-from tankcal.record.plain_data import rows_of
+import numpy as np
+
+from tankcal.record.columns import Texts, as_columns
 from tankcal.report import numbers
 from tankcal.report.tables.table import Column, Table
 from tankcal.text.digits import decimals_of, fixed, format_significant
@@ -100,32 +102,33 @@ GROUPS = Table(
 
 
 def in_their_units(found):
-    """Readings, {key: values}, in the units that they are shown in, named beside them."""
+    """`ArrayColumns` of readings, {key: values}, in the units that they are shown in.
+
+    The units are named beside them.
+    """
+    found = as_columns(found)
+    units = found.arrays["unit"] if found.count else Texts.of([])
     large, small = (
-        [of(unit) for unit in found["unit"]] for of in (numbers.large_unit, numbers.small_unit)
+        [of(unit) for unit in units.texts] for of in (numbers.large_unit, numbers.small_unit)
+    )
+    times_large, times_small = (
+        np.array([factor for _, factor in one], dtype=float)[units.codes] for one in (large, small)
     )
     return found | {
-        "value": _times(found["value"], large),
-        **{key: _times(found[key], small) for key in _SMALL if key in found},
-        "large_unit": [unit for unit, _ in large],
-        "small_unit": [unit for unit, _ in small],
-        "value_unit": _spelled(large, found["unit"]),
-        "unit": _spelled(small, found["unit"]),
+        "value": found.arrays["value"] * times_large,
+        **{key: found.arrays[key] * times_small for key in _SMALL if key in found},
+        "large_unit": Texts(units.codes, tuple(unit for unit, _ in large)),
+        "small_unit": Texts(units.codes, tuple(unit for unit, _ in small)),
+        "value_unit": Texts(units.codes, _spelled(large, units.texts)),
+        "unit": Texts(units.codes, _spelled(small, units.texts)),
     }
 
 
 _SMALL = ("residual", "sd", "mdb", "change")
 
 
-def _times(values, units):
-    return [
-        None if value is None else value * factor
-        for value, (_, factor) in zip(values, units, strict=True)
-    ]
-
-
 def _spelled(units, own):
-    return [numbers.spelled(unit) or name for (unit, _), name in zip(units, own, strict=True)]
+    return tuple(numbers.spelled(unit) or name for (unit, _), name in zip(units, own, strict=True))
 
 
 def _decimals(row):
@@ -215,7 +218,7 @@ READINGS = Table(
                in_sheet={"text": None}),
         Column("row", decimals=0, sheet="row", width=7, csv="row", in_sheet={"nothing": ""}),
     ),
-    rows=lambda record: rows_of(in_their_units(record["adjustment"]["residuals"])),
+    rows=lambda record: list(in_their_units(record["adjustment"]["residuals"]).rows()),
     last={
         "sheet": "residual sd mdb unit redundancy w tau effect_m use repeats file row",
         "csv": "residual sd mdb unit redundancy w tau effect_m controlled removed check repeats "

@@ -2,6 +2,9 @@
 
 from dataclasses import replace
 
+import numpy as np
+
+from tankcal.record.columns import NO_INTEGER, ArrayColumns, Texts, as_columns
 from tankcal.report import numbers
 from tankcal.report.tables.table import Column, Table
 from tankcal.text.digits import decimals_of, decimals_of_mantissa
@@ -37,50 +40,69 @@ def _of_axes(key, unit, sd, **more):
 # ---- points
 
 
+def point_columns(record, points=None):
+    """`ArrayColumns` of points (None: all): sds, what the adjustment and a tank's wall say of them.
+
+    points  rows of the record
+    """
+    points = as_columns(record["points"] if points is None else points)
+    if not points.count:
+        return points
+    columns = {key: points.arrays[key] for key in ("point", "x_m", "y_m", "z_m")}
+    columns |= _sds(points.arrays["cov_m2"])
+    adjusted = (record["adjustment"] or {}).get("points", [])
+    if len(adjusted):
+        columns |= _adjusted(points["point"], as_columns(adjusted))
+    if record["capacity"] is not None:
+        columns |= _about_wall(points, record["rejected"])
+    return ArrayColumns(columns)
+
+
 def point_rows(record, points=None):
-    """Points (None: all) with sds; what the adjustment and the wall of a tank say of them."""
-    rejected = {row["point"]: row for row in record["rejected"]}
-    adjusted = {row["point"]: row for row in (record["adjustment"] or {}).get("points", [])}
-    of_tank = record["capacity"] is not None
-    found = []
-    for point in record["points"] if points is None else points:
-        row = {key: point[key] for key in ("point", "x_m", "y_m", "z_m")} | _sds(point["cov_m2"])
-        if adjusted:
-            row |= _adjusted(adjusted.get(point["point"]))
-        if of_tank:
-            row |= _about_wall(point, rejected.get(point["point"], {}))
-        found.append(row)
-    return found
+    """The same as a list of dicts."""
+    return list(point_columns(record, points).rows())
 
 
 def _sds(covariance):
-    if covariance is None:
-        return {"sx_m": None, "sy_m": None, "sz_m": None}
-    return {f"s{axis}_m": max(covariance[i][i], 0.0) ** 0.5 for i, axis in enumerate("xyz")}
+    if covariance.ndim < 3:  # none is known
+        return {f"s{axis}_m": covariance for axis in "xyz"}
+    return {f"s{axis}_m": np.sqrt(np.maximum(covariance[:, i, i], 0.0))
+            for i, axis in enumerate("xyz")}  # fmt: skip
 
 
-def _adjusted(point):
-    if point is None:
-        return {}
-    keys = ("kind", "rays", "spherical_sd_m", "quadratic_sd_m")
+def _adjusted(names, adjusted):
+    """What the adjustment says of points; nothing of those that it does not know."""
+    place = {name: i for i, name in enumerate(adjusted["point"])}
+    rows = np.array([place.get(name, -1) for name in names])
+    unknown, found = rows < 0, adjusted.take(rows).arrays
+    floats = {key: found[key] for key in ("spherical_sd_m", "quadratic_sd_m")}
+    floats |= {f"e{i}_m": axis for i, axis in enumerate(found["ellipsoid_m"].T, 1)}
+    floats["azimuth_deg"] = found["ellipsoid_azimuth_deg"]
+    floats["elevation_deg"] = found["ellipsoid_elevation_deg"]
+    held = found["fixed"] @ (1, 2, 4)
     return {
-        **{key: point[key] for key in keys},
-        **{f"e{i}_m": axis for i, axis in enumerate(point["ellipsoid_m"], 1)},
-        "fixed": "".join(axis for axis, held in zip("xyz", point["fixed"], strict=True) if held),
-        "azimuth_deg": point["ellipsoid_azimuth_deg"],
-        "elevation_deg": point["ellipsoid_elevation_deg"],
+        "kind": Texts(np.where(unknown, -1, found["kind"].codes), found["kind"].texts),
+        "rays": np.where(unknown, NO_INTEGER, found["rays"]),
+        **{key: np.where(unknown, np.nan, one) for key, one in floats.items()},
+        "fixed": Texts(np.where(unknown, -1, held), ("", "x", "y", "xy", "z", "xz", "yz", "xyz")),
     }
 
 
-def _about_wall(point, rejected):
-    keys = ("course", "section", "generatrix", "residual_m", "used")
+def _about_wall(points, rejected):
+    """What the wall of a tank says of points: where they are on it, or why they are not."""
+    rejected = {row["point"]: row for row in rejected}
+    about = [rejected.get(name, {}) for name in points["point"]]
+    there = [
+        residual if used else one.get("residual_m")
+        for residual, used, one in zip(points["residual_m"], points["used"], about, strict=True)
+    ]
     return {
-        **{key: point[key] for key in keys},
-        "residual_there_m": point["residual_m"] if point["used"] else rejected.get("residual_m"),
-        "reason": rejected.get("reason", ""),
-        "w": rejected.get("w"),
-        "row": rejected.get("row"),
-    }
+        **{key: points.arrays[key]
+           for key in ("course", "section", "generatrix", "residual_m", "used")},
+        "residual_there_m": there,
+        "reason": [one.get("reason", "") for one in about],
+        **{key: [one.get(key) for one in about] for key in ("w", "row")},
+    }  # fmt: skip
 
 
 def _reason(paper, row):
@@ -88,7 +110,7 @@ def _reason(paper, row):
 
 
 def _kind_of_point(paper, row):
-    return paper.words["plan"].get(row.get("kind"), row.get("kind", ""))
+    return paper.words["plan"].get(row["kind"], row["kind"] or "")
 
 
 _OF_TANK = {"on": "", "optional": True}

@@ -1,6 +1,8 @@
 """The sheets of an adjusted survey: Adjustment, Points, Observations, Cameras and photos."""
 
-from tankcal.record.plain_data import rows_of
+import numpy as np
+
+from tankcal.record.columns import as_columns
 from tankcal.report.tables.readings import GROUPS, READINGS, in_their_units
 from tankcal.report.tables.survey import (
     CHECK_POINTS,
@@ -117,9 +119,10 @@ def points_sheet(book, record):
     """
     of_tank = record["capacity"] is not None
     code = "points" if of_tank else "adjusted_points"
-    used = sum(row["used"] for row in record["points"]) if of_tank else 0
-    subtitle = book.word(f"texts.{code}_subtitle", count=len(record["points"]), used=used)
-    shown = _weakest(record["points"])
+    points = as_columns(record["points"])
+    used = sum(points["used"]) if of_tank else 0
+    subtitle = book.word(f"texts.{code}_subtitle", count=points.count, used=used)
+    shown = _weakest(points)
     if len(shown) == MOST_POINTS:
         subtitle = book.word("texts.weakest_points", text=subtitle, shown=len(shown))
     sheet = book.sheet(code, subtitle, landscape=True)
@@ -132,17 +135,15 @@ def points_sheet(book, record):
     book.freeze(sheet, _HEAD_ROW, 1)
 
 
-def _weakest(rows):
-    """The rows, in their order; of very many those not used, then those with the largest sds."""
-    if len(rows) < MOST_POINTS:
-        return rows
-
-    def rank(i):
-        covariance = rows[i]["cov_m2"]
-        variance = 0.0 if covariance is None else sum(covariance[k][k] for k in range(3))
-        return rows[i]["used"] is not False, -variance
-
-    return [rows[i] for i in sorted(sorted(range(len(rows)), key=rank)[:MOST_POINTS])]
+def _weakest(points):
+    """Rows, in their order; of very many those not used, then those with the largest sds."""
+    if points.count >= MOST_POINTS:
+        covariance = points.arrays["cov_m2"]
+        is_known = covariance.ndim > 1
+        variance = np.nan_to_num(np.einsum("nii->n", covariance)) if is_known else 0.0
+        rank = np.lexsort((np.broadcast_to(-variance, points.count), points.arrays["used"]))
+        points = points.take(np.sort(rank[:MOST_POINTS]))
+    return list(points.rows())
 
 
 # ---- observations
@@ -150,13 +151,13 @@ def _weakest(rows):
 
 def observations_sheet(book, record):
     """One row a reading, to be filtered; those set aside stand back and say so."""
-    readings = record["adjustment"]["residuals"]
-    count = len(readings["w"])
+    readings = as_columns(record["adjustment"]["residuals"])
+    count = readings.count
     subtitle = book.word("texts.residuals_subtitle")
     if count > MOST_READINGS:
         subtitle = book.word("texts.worst_subtitle", shown=MOST_READINGS, all=count)
         readings = _worst(readings)
-    rows = rows_of(in_their_units(readings))
+    rows = list(in_their_units(readings).rows())
     sheet = book.sheet("observations", subtitle, landscape=True)
     columns = columns_of(book, READINGS, rows)
     set_widths(book, sheet, columns)
@@ -167,12 +168,9 @@ def observations_sheet(book, record):
 
 def _worst(readings):
     """The worst readings, in their order: those set aside first, then by test quantity."""
-    rank = [
-        (not removed, -abs(w or 0.0))
-        for removed, w in zip(readings["removed"], readings["w"], strict=True)
-    ]
-    kept = sorted(sorted(range(len(rank)), key=rank.__getitem__)[:MOST_READINGS])
-    return {key: [values[i] for i in kept] for key, values in readings.items()}
+    size = np.abs(np.nan_to_num(readings.arrays["w"]))
+    rank = np.lexsort((-size, ~readings.arrays["removed"]))
+    return readings.take(np.sort(rank[:MOST_READINGS]))
 
 
 # ---- cameras and photographs

@@ -43,10 +43,10 @@ MIRRORED = 0.2  # share of its error that a photo may keep when it is mirrored
 def diagnose(adjusted, readings, groups, known):
     """Problem rows for everything that is found.
 
-    adjusted  network.Adjusted            readings  Reading rows, those set aside among them
+    adjusted  network.Adjusted            readings  Readings, those set aside among them
     groups    GroupOfReadings             known     Known control
     """
-    doubtful = [one for one in readings if one.removed or abs(one.w) > CRITICAL]
+    doubtful = list(readings.where(readings.removed | (np.abs(readings.columns["w"]) > CRITICAL)))
     return [
         *failed_test(adjusted, groups),
         *find_swapped_points(adjusted.survey.points, adjusted.xyz_m, known),
@@ -181,8 +181,10 @@ def wrong_angles(readings, doubtful):
     """Stations whose angles in one file fit once gon and degrees are exchanged."""
     stations = {(one.file, one.ids[0]) for one in doubtful if one.unit == "rad" and one.row}
     members = defaultdict(list)
-    for one in readings:
-        if (one.file, one.ids[0]) in stations and not one.check and np.isfinite(one.residual):
+    files = np.isin(readings.columns["file"], list({file for file, _ in stations}))
+    there = np.isfinite(readings.columns["residual"])
+    for one in readings.where(files & there & ~readings.check):
+        if (one.file, one.ids[0]) in stations:
             members[one.file, one.ids[0]].append(one)
     found = []
     for (file, station), mine in members.items():

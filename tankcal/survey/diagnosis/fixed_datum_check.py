@@ -195,25 +195,26 @@ def _wrong(adjusted, known, point, axis, here_m, value_m):
 def strained(readings, known):
     """Problem rows on held coordinates that the readings contradict: all that explain as much.
 
-    readings  Reading rows, those of held coordinates among them     known  Known control
+    readings  Readings, those of held coordinates among them     known  Known control
 
     A held coordinate is not doubted where a reading explains the contradiction better.
     """
-    held = [one for one in readings if _tested(one)]
+    held = list(readings.where(_are_tested(readings)))
     limit = -float(ndtri(0.5 * LEVEL / max(len(held), 1)))
     most = max((abs(one.w) for one in held), default=0.0)
-    used = [abs(one.w) for one in readings if not (one.removed or one.check) and one.w == one.w]
     if most <= limit:
         return []
     # what explains as much as the best of all is named though it alone would not be tested
-    least = max(most, *used) ** 2 - CRITICAL**2
+    used = np.abs(readings.columns["w"][~readings.removed & ~readings.check])
+    least = max(most, used[~np.isnan(used)].max(initial=0.0)) ** 2 - CRITICAL**2
     found = [one for one in held if one.w**2 > least]
     return [_strained(one) for one in sorted(found, key=lambda one: -abs(one.w))[: 2 * LISTED]]
 
 
-def _tested(one):
-    """Whether a Reading is a held control coordinate that readings test."""
-    return one.kind == "control coordinate" and one.sd == 0 and np.isfinite(one.mdb)
+def _are_tested(readings):
+    """(n,) whether Readings are held control coordinates that others test."""
+    found = readings.columns
+    return readings.are("control coordinate") & (found["sd"] == 0) & np.isfinite(found["mdb"])
 
 
 def _strained(one):

@@ -30,19 +30,20 @@ TESTED = 60  # readings set aside of which it is asked whether others might have
 def find_one_sided_losses(readings, known):
     """Problem rows on things that lost many more of their values than everything else.
 
-    readings  Reading rows              known  Known control
+    readings  Readings                  known  Known control
     """
-    used = [one for one in readings if not one.check and one.file != "cameras.toml"]
-    things = defaultdict(list)
-    for one in used:
-        for thing in _things(one, known):
-            things[thing].append(one)
-    total, gone = len(used), sum(one.removed for one in used)
+    used = readings.where(~readings.check & (readings.columns["file"] != "cameras.toml"))
+    total, gone = len(used), int(used.removed.sum())
     if not gone:
         return []
+    things = defaultdict(lambda: [0, 0])
+    rows = (used.columns[name].tolist() for name in ("kind", "file", "ids", "removed"))
+    for *one, removed in zip(*rows, strict=True):
+        for thing in _things(*one, known):
+            things[thing][0] += 1
+            things[thing][1] += removed
     found = []
-    for (file, name), mine in things.items():
-        n, k = len(mine), sum(one.removed for one in mine)
+    for (file, name), (n, k) in things.items():
         p = (gone - k + 1) / (total - n + 2)
         if k > 2 and n < total and betainc(k, n - k + 1, p) < LEVEL / len(things):
             told = _far_more(name, k, n) if file == "control.csv" else _much_of_photo(name, k, n)
@@ -52,12 +53,12 @@ def find_one_sided_losses(readings, known):
     return [*_lost_control(used), *(one for _, one in found[:LISTED]), *_many(gone, total)]
 
 
-def _things(one, known):
+def _things(kind, file, ids, known):
     """(file, name) of what a value hangs on."""
-    if one.kind == "image coordinate":
-        yield one.file, one.ids[0]
-    for name in dict.fromkeys(one.ids):
-        if name in known.row and not one.kind.startswith("control coordinate"):
+    if kind == "image coordinate":
+        yield file, ids[0]
+    for name in dict.fromkeys(ids):
+        if name in known.row and not kind.startswith("control coordinate"):
             yield "control.csv", name
 
 
@@ -87,8 +88,8 @@ def _lost_control(readings):
     """Known coordinates that were set aside."""
     gone = [
         one
-        for one in readings
-        if one.removed and one.kind.startswith("control coordinate") and np.isfinite(one.residual)
+        for one in readings.where(readings.removed)
+        if one.kind.startswith("control coordinate") and np.isfinite(one.residual)
     ]
     return [
         Problem(one.file, _lost(one), one.row, f"{one.element}_m") for one in gone[: 2 * LISTED]

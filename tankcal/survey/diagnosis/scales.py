@@ -17,14 +17,12 @@ SHOWN = 3
 def check_readings_off(readings):
     """Problem rows of check readings that differ by more than their uncertainty allows.
 
-    readings  `Reading` rows, those with check=True are looked at
+    readings  Readings, those with check=True are looked at
     """
     problems = []
-    for one in readings:
-        if not one.check or not np.isfinite(one.w) or abs(one.w) <= DISAGREE:
-            continue
-        if one.kind not in LENGTHS or not one.value:
-            continue
+    w, value = readings.columns["w"], readings.columns["value"]
+    off = readings.check & np.isfinite(w) & (np.abs(w) > DISAGREE) & (value != 0)
+    for one in readings.where(off & readings.are(*LENGTHS)):
         text = message(
             "check_reading_off",
             "the check reading {reading} differs by {times:.1f} times its standard deviation "
@@ -108,9 +106,9 @@ def _adjusted(adjusted, place, cov_scale):
 def _read(readings, place, measurements):
     """(relative difference, its sd, names) of each length read between two points of control."""
     station = {one.name: one.station for one in measurements.setups}
-    for one in readings:
-        if one.kind not in LENGTHS or one.check or one.unit != "m" or one.value < LEAST_LENGTH_M:
-            continue
+    found = readings.columns
+    is_length = readings.are(*LENGTHS) & (found["unit"] == "m")
+    for one in readings.where(is_length & ~readings.check & ~(found["value"] < LEAST_LENGTH_M)):
         names = tuple(station.get(name, name) for name in one.ids[:2])
         if len(names) == 2 and set(names) <= set(place) and np.isfinite(one.residual):
             yield -one.residual / one.value, one.sd / one.value, names
