@@ -32,7 +32,6 @@ from tankcal.record.images import (
 )
 from tankcal.record.schema import Columns, Saved, filled_from, key
 from tankcal.record.texts import Text, text_of
-
 from tankcal.survey.results import DatumReport, GroupOfReadings, Reading, Readings
 
 CONFIDENCE = 0.95  # of the global test and of the intervals of variance factors
