@@ -78,17 +78,19 @@ class Skipped:
 
 @dataclass(frozen=True)
 class Growth:
-    """How seconds grow with size: of each size the median, and the slope of their logarithms."""
+    """How seconds, and memory where it was measured, grow with size."""
 
     name: str
     unit: str
     sizes: tuple[float, ...]
     seconds: tuple[float, ...]
+    memory_mb: tuple[float, ...] = ()
+    note: str = ""
 
     @property
-    def slope(self):
-        """Of the straight line through log(seconds) over log(size)."""
-        return float(np.polyfit(np.log(self.sizes), np.log(self.seconds), 1)[0])
+    def slopes(self):
+        """Of log(seconds) over log(size), between each size and the one before."""
+        return np.diff(np.log(self.seconds)) / np.diff(np.log(self.sizes))
 
 
 KINDS = {"rows": Row, "skipped": Skipped, "growth": Growth}
@@ -130,7 +132,7 @@ def line_of(what):
     if isinstance(what, Growth):
         pairs = zip(what.sizes, what.seconds, strict=True)
         each = ", ".join(f"{size:g}: {shown(seconds)}" for size, seconds in pairs)
-        return f"{what.name}, {what.unit}: slope {what.slope:.2f} ({each})"
+        return f"{what.name}, {what.unit}: slopes {sloped(what)} ({each})"
     parts = [f"{what.name} ({what.size}): tankcal {spread(what.seconds)}"]
     if what.memory_mb:
         parts.append(f"{what.memory_mb:.0f} MB")
@@ -139,6 +141,11 @@ def line_of(what):
     if what.answer:
         parts.append(answered(what))
     return ", ".join(parts) + (f" ({what.note})" if what.note else "")
+
+
+def sloped(growth):
+    """The slopes of a growth."""
+    return ", ".join(f"{slope:.2f}" for slope in growth.slopes)
 
 
 def shown(seconds):

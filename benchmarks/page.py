@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from guard import RELEASED, fallen
-from measured import read, shown, spread, times
+from measured import read, shown, sloped, spread, times
 
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 
@@ -42,7 +42,7 @@ def tables(results, released):
     ]
     if found["growth"]:
         rows = [growth_row(one) for one in found["growth"]]
-        head = ("what", "sizes", "times", "slope")
+        head = ("what", "sizes", "times", "memory", "slopes", "remark")
         parts += ["### Growth", table(head, rows)]
     if found["skipped"]:
         rows = [(one.name, one.peer or "all of it", one.reason) for one in found["skipped"]]
@@ -109,7 +109,8 @@ def alone_row(row):
 def growth_row(one):
     """A row of the table of growth."""
     sizes = ", ".join(f"{size:g}" for size in one.sizes) + f" {one.unit}"
-    return one.name, sizes, ", ".join(map(shown, one.seconds)), f"{one.slope:.2f}"
+    memory = ", ".join(f"{size:.0f}" for size in one.memory_mb) + " MB" * bool(one.memory_mb)
+    return one.name, sizes, ", ".join(map(shown, one.seconds)), memory, sloped(one), one.note
 
 
 def main(results, page):

@@ -112,7 +112,7 @@ def machine():
     return {
         "processor": processor(),
         "cores": os.cpu_count(),
-        "kernel": f"{platform.system()} {platform.release()}",
+        "kernel": f"{platform.system()} {platform.release().split('-')[0]}",
         "versions": versions,
     }
 

@@ -97,7 +97,9 @@ def made(name, folder):
     else:
         peers += [Ceres(kind, path), Ceres(kind, path, radius=1e10)]
     if name == "b":
-        del classes["scipy"]
+        classes = {}
+        for peer in ("pyceres", "gtsam"):
+            tell(Skipped("adjustment b", peer, "53 643 readings by functions in Python"))
         tell(Skipped("adjustment b", "scipy least_squares", "8 GB for its dense Jacobian"))
     for package, make in classes.items():
         if found := peer_module(package, f"adjustment {name}"):
