@@ -1,6 +1,5 @@
 """The uncertainty of every row of a table of 1 mm, beside GTC and `uncertainties`.
 
-    pip install GTC uncertainties
     python benchmarks/uncertainty.py [rows]        (default: 9500)
 
 A tank of eight courses with a ring of fourteen points each, and 130 inputs: 112 radii with a full
@@ -255,7 +254,7 @@ def main():
     about = {"answer": "volumes and u, J C J'", "least": LEAST}
     for package, (version, peer) in peers.items():
         theirs = digits(*np.transpose(list(peer.found.values())), list(peer.found))
-        note = "" if peer.done >= ROUNDS * len(peer.rows) else "some of the rows, extrapolated"
+        note = "some of the rows, extrapolated" * (len(peer.found) < len(peer.rows))
         tell(Row(name, size, seconds["tankcal"], package, version, seconds[package],
                  digits=(own, theirs), note=note, **about))  # fmt: skip
     if not peers:
