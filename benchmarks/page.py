@@ -73,7 +73,7 @@ def machine_rows(results):
     yield "processor", f"{machine['processor']}, {machine['cores']} cores"
     yield "kernel", machine["kernel"]
     yield from machine["versions"].items()
-    yield "rounds", str(results["rounds"])
+    yield "rounds", f"{results['rounds']}, more where a task takes milliseconds"
     if busy is not None:
         quiet = "the machine was quiet" if busy < 0.1 else "read ratios, not times"
         yield "other programs took meanwhile", f"{busy:.1f} cores on the average: {quiet}"

@@ -4,6 +4,7 @@ import json
 import math
 import sys
 from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import numpy as np
@@ -149,6 +150,18 @@ def test_kept_page_says_on_what_it_was_made():
     released = json.loads(guard.RELEASED.read_text(encoding="utf-8"))
     assert released["release"] in inside
     assert released["ratios"]
+
+
+def test_site_shows_the_run_that_was_made_with_it(tmp_path, monkeypatch):
+    spec = spec_from_file_location("stage_of_site", ROOT / "docs" / "stage.py")
+    stage = module_from_spec(spec)
+    spec.loader.exec_module(stage)
+    results = tmp_path / "benchmarks.json"
+    results.write_text(json.dumps(results_of(Row("a task of this run", "", (1.0,)))))
+    monkeypatch.setattr(stage, "RESULTS", results)
+    kept = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    assert "a task of this run" not in kept
+    assert "| a task of this run |" in stage.with_results(kept)
 
 
 def test_every_benchmark_is_there():
