@@ -173,6 +173,16 @@ def test_processor_of_others_is_no_less_than_none():
     assert run.others(run.now()) is None or run.others(run.now()) >= 0
 
 
+def test_absent_peer_is_named_with_what_the_installer_said(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    assert measured.peer_module("no_such_peer", "task") is None
+    (tmp_path / "errors.json").write_text('{"no_such_peer": "no wheel"}')
+    assert measured.peer_module("no_such_peer", "task") is None
+    told = capsys.readouterr().out.splitlines()
+    assert told[0].startswith("task: no_such_peer left out: No module")
+    assert told[1] == "task: no_such_peer left out: no wheel"
+
+
 def test_error_of_the_installer_in_one_line_without_addresses():
     text = "WARNING: x\nERROR: no wheel at https://a.example/simple for it\n"
     assert peers.told(text) == "no wheel at ... for it"
