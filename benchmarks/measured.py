@@ -15,6 +15,7 @@ import statistics
 import sys
 import time
 from dataclasses import asdict, dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -130,8 +131,10 @@ def line_of(what):
     if isinstance(what, Skipped):
         return f"{what.name}: {what.peer or 'all of it'} left out: {what.reason}"
     if isinstance(what, Growth):
-        pairs = zip(what.sizes, what.seconds, strict=True)
-        each = ", ".join(f"{size:g}: {shown(seconds)}" for size, seconds in pairs)
+        each = ", ".join(
+            f"{size:g}: {shown(seconds)}" + (f", {memory:.0f} MB" if memory else "")
+            for size, seconds, memory in zip_longest(what.sizes, what.seconds, what.memory_mb)
+        )
         return f"{what.name}, {what.unit}: slopes {sloped(what)} ({each})"
     parts = [f"{what.name} ({what.size}): tankcal {spread(what.seconds)}"]
     if what.memory_mb:
