@@ -1,13 +1,14 @@
 # One door for developers, the same in CI. Each target does its own set-up.
 VENV := .venv
 BIN := $(VENV)/bin
+PEERS := $(VENV)/peers# what is compared with, on top of $(VENV)
 export OPENBLAS_NUM_THREADS ?= 1
 unexport PYTHONDONTWRITEBYTECODE # else each process compiles all modules and tests again: 14 s
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow test-rest test-all study study-full check format notebooks job-format schemas bench peer picture site wheel clean
+.PHONY: help demo test test-slow test-rest test-all study study-full check format notebooks job-format schemas bench benchmark-page picture site site-of-notebooks wheel clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -58,21 +59,11 @@ schemas: $(VENV)/full ## write the JSON schemas of what is saved and docs/saved-
 	PYTHONPATH=.:tests $(BIN)/python tests/schemas.py
 
 bench: export ROUNDS ?= 5
-bench: $(VENV)/full ## time and memory of the main job, walls, tables of 1 mm rows and their u, ten million points, files of scanners, plans
-	$(BIN)/python benchmarks/main_job.py
-	$(BIN)/python benchmarks/strapping.py
-	$(BIN)/python benchmarks/table.py
-	$(BIN)/python benchmarks/uncertainty.py
-	$(BIN)/python benchmarks/monte_carlo.py 9500 $(ROUNDS)
-	$(BIN)/python benchmarks/wall.py
-	$(BIN)/python benchmarks/clouds.py
-	$(BIN)/python benchmarks/cloud_cells.py
-	$(BIN)/python benchmarks/cloud_peers.py
-	$(BIN)/python benchmarks/planning.py $(ROUNDS)
+bench: $(PEERS)/errors.json ## time and memory of what people wait for, beside Ceres, gtsam, GTC, open3d, fluids: build/benchmarks.json
+	$(PEERS)/bin/python benchmarks/run.py $(ONLY)
 
-peer: $(VENV)/full ## the adjustment against C++ Ceres (needs libceres-dev)
-	$(MAKE) -C benchmarks/adjustment
-	$(BIN)/python benchmarks/adjustment/run.py
+benchmark-page: ## fill the tables of docs/benchmarks.md with the last make bench
+	$(BIN)/python benchmarks/page.py build/benchmarks.json docs/benchmarks.md
 
 picture: notebooks ## the pictures in the README, of the example's report and the notebooks (needs poppler)
 	$(BIN)/tankcal demo --quiet --out demo-results
@@ -81,7 +72,10 @@ picture: notebooks ## the pictures in the README, of the example's report and th
 	$(BIN)/python docs/notebook_pictures.py build/notebooks docs/images
 	$(BIN)/python docs/wall_pictures.py docs/images
 
-site: notebooks $(VENV)/docs ## these pages, the executed notebooks and the API as a site: build/site/index.html
+site: notebooks ## these pages, the executed notebooks and the API as a site: build/site/index.html
+	$(MAKE) site-of-notebooks
+
+site-of-notebooks: $(VENV)/docs # that were executed already
 	$(BIN)/python docs/stage.py build/site-source build/notebooks
 	$(BIN)/sphinx-build -q -W --keep-going -c docs -b html build/site-source build/site
 
@@ -96,6 +90,9 @@ $(VENV)/base: pyproject.toml constraints.txt
 $(VENV)/full: $(VENV)/base
 	$(BIN)/pip install --quiet --editable '.[test,check,images,clouds,cluster,lab,app]'
 	touch $@
+
+$(PEERS)/errors.json: $(VENV)/full benchmarks/peers.py
+	$(BIN)/python benchmarks/peers.py $(PEERS)
 
 $(VENV)/release: $(VENV)/full
 	$(BIN)/pip install --quiet --editable '.[release]'

@@ -11,6 +11,7 @@ import sys
 import time
 
 import numpy as np
+from measured import Row, tell
 
 from tankcal.clouds.wall import find_cloud_wall, readings_of
 
@@ -37,7 +38,7 @@ def passes_of(millions, scans, spent):
 
 
 def main():
-    """Print what one run takes."""
+    """Rows of one run."""
     millions = float(sys.argv[1]) if len(sys.argv) > 1 else 10
     scans = int(sys.argv[2]) if len(sys.argv) > 2 else 4
     spent = [0.0]
@@ -49,12 +50,12 @@ def main():
     )
     found = time.process_time()
     readings = readings_of(wall)
-    print(
-        f"cells of a wall, {millions:g} million points, {scans} scans, {wall.grid.rows} x "
-        f"{wall.grid.columns} cells: {found - before - spent[0]:.2f} s, {len(readings.scan)} "
-        f"readings {time.process_time() - found:.2f} s, peak "
-        f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3:.0f} MB"
-    )
+    read = time.process_time() - found
+    cells = f"{wall.grid.rows} x {wall.grid.columns} cells"
+    size = f"{millions:g} million points, {scans} scans, {cells}"
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+    tell(Row("cells of a wall", size, (found - before - spent[0],), memory_mb=memory))
+    tell(Row("readings of the cells", f"{len(readings.scan)} readings", (read,)))
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ largest sum of what all of them hold (proportional set sizes, looked at five tim
 """
 
 import argparse
+import json
 import os
 import subprocess
 import sys
@@ -19,6 +20,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from measured import Row, tell
 
 from tankcal.clouds import describe_cloud
 from tankcal.clouds.wall import find_cloud_wall
@@ -33,7 +35,7 @@ RADIUS_M, HEIGHT_M, NOISE_M = 6.5, 9.5, 0.002
 
 
 def main(points, kinds, workers):
-    """Print a line for each format."""
+    """A row for each format."""
     with tempfile.TemporaryDirectory() as folder:
         for kind in kinds:
             path = Path(folder) / f"wall.{kind}"
@@ -44,8 +46,7 @@ def main(points, kinds, workers):
 
 
 def measure(command):
-    """Run a command; print its line with seconds and memory of it and all of its children."""
-    start = time.perf_counter()
+    """Run a command; a row with seconds and memory of it and all of its children."""
     child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     held, done = [0.0], threading.Event()
 
@@ -59,14 +60,11 @@ def measure(command):
     _, status, usage = os.wait4(child.pid, 0)
     done.set()
     watch.join()
-    seconds = time.perf_counter() - start
-    print(
-        f"{line}, {usage.ru_utime + usage.ru_stime:.1f} s of processor in all, "
-        f"{seconds:.1f} s by the clock, peak {max(held):.0f} MB",
-        flush=True,
-    )
     if status:
         sys.exit(1)
+    kind, size, note = json.loads(line.splitlines()[-1])
+    spent = (usage.ru_utime + usage.ru_stime,)
+    tell(Row(f"file of a scanner, {kind}", size, spent, memory_mb=max(held), note=note))
 
 
 def family(pid):
@@ -208,7 +206,7 @@ class OneCloud:
 
 
 def run(path, workers):
-    """Find the wall of a file and print what it took."""
+    """Find the wall of a file; its format, its size and a note are printed as JSON."""
     clouds = OneCloud(path)
     start, steps = time.perf_counter(), []
     telling = Telling(lambda text: steps.append(time.perf_counter()))
@@ -222,11 +220,13 @@ def run(path, workers):
         )
         end = time.perf_counter()
     header = clouds.files[0].header
-    print(
-        f"{header.format}: {wall.delivered[0]} points, {header.bytes / 1e6:.0f} MB, {workers} "
-        f"workers ({opened - start:.1f} s to start), {wall.grid.rows} x {wall.grid.columns} cells, "
-        f"sample {steps[1] - opened:.1f} s, cells {end - steps[1]:.1f} s"
+    size = f"{wall.delivered[0]} points, {header.bytes / 1e6:.0f} MB"
+    note = (
+        f"with imports; {workers} workers, {wall.grid.rows} x {wall.grid.columns} cells; by the "
+        f"clock: start {opened - start:.1f} s, sample {steps[1] - opened:.1f} s, "
+        f"cells {end - steps[1]:.1f} s"
     )
+    print(json.dumps([header.format, size, note]))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ The goal: under 1 s each, once the loops are compiled.
 
 import os
 import sys
-import time
+from functools import partial
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 import numpy as np
 from exported_records import lying, rows, sphere, tank_s1
+from measured import Row, interleaved, tell
 
 from tankcal.exports.breakpoints import best_breakpoints
 
@@ -26,25 +27,20 @@ TANKS = {
     "upright, 8 401 rows": (tank_s1, 8.4, 0.001),
     "upright, 25 001 rows": (tank_s1, 8.4, 0.000336),
 }
-POINTS = (10, 20, 50, 100, 1000)
-ROUNDS = 3
+POINTS = (20, 100, 1000)
 
 
 def main():
-    """Print a row for each tank: for each number of points seconds and the error in litres."""
+    """A row for each tank and number of points; its note has the error in litres."""
     best_breakpoints(*rows(lying, 2.4, 0.001), 20)  # compiles
-    print(f"{'tank':<24}" + "".join(f"{f'K = {points}':>20}" for points in POINTS))
     for name, tank in TANKS.items():
         height, volume = rows(*tank)
-        cells = []
+        written = np.round(volume, 6)
         for points in POINTS:
-            seconds = []
-            for _ in range(ROUNDS):
-                start = time.process_time()
-                found = best_breakpoints(height, volume, points, written=np.round(volume, 6))
-                seconds.append(time.process_time() - start)
-            cells.append(f"{min(seconds):.2f} s, {1000 * found.error:.4g} L")
-        print(f"{name:<24}" + "".join(f"{cell:>20}" for cell in cells))
+            work = partial(best_breakpoints, height, volume, points, written=written)
+            error = 1000 * work().error
+            (seconds,) = interleaved({name: work}).values()
+            tell(Row(f"best {points} rows", name, seconds, note=f"error {error:.4g} L"))
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from dataclasses import replace
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from measured import Row, tell
 from scipy.stats import norm
 
 import tankcal
@@ -30,6 +31,7 @@ from tankcal.pipeline.simulation import simulate_table
 from tankcal.text.shipped import shipped_folder
 
 FINE = Goal(seed=99, plain_draws=50_000_000)
+ENOUGH_SEEDS = 20  # of fewer a standard deviation says little
 COURSES, RADIUS_M, HEIGHT_M, EXPANSION = 8, 7.1, 9.5, 1.1e-5
 ORDINARY = ("normal",) * 20
 MIXED = ("t", "rectangular", "rectangular", "u-shaped", "triangular", "normal", "normal", "t")
@@ -133,7 +135,7 @@ def shipped_example(seeds):
 
 
 def main():
-    """Print a line for each mixture of inputs."""
+    """A row for each mixture of inputs."""
     rows = int(sys.argv[1]) if len(sys.argv) > 1 else 9500
     seeds = int(sys.argv[2]) if len(sys.argv) > 2 else 50
     chosen = np.linspace(0, rows - 1, 20).astype(int)
@@ -141,19 +143,19 @@ def main():
              ("normal, u x 20", ORDINARY, 20.0))  # fmt: skip
     runs = [scatter(*tank(rows, kinds, factor), seeds) for _, kinds, factor in cases]
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(f"{rows} rows, 20 inputs, {seeds} seeds; peak memory {peak:.0f} MB in all")
-    print("rms error of a run by the standard error of 1e6 plain draws, the worst row:")
-    print(f"{'inputs':<22}{'cpu s':>7}{'clock s':>9}{'u':>9}{'low':>9}{'high':>9}")
+    size = f"{rows} rows, 20 inputs, {seeds} seeds"
     for (name, kinds, factor), (found, spent) in zip(cases, runs, strict=True):
-        show(name, worst_ratios(found, *tank(rows, kinds, factor), chosen), spent)
+        show(name, size, worst_ratios(found, *tank(rows, kinds, factor), chosen), spent, peak)
     ratios, spent, count = shipped_example(seeds)
-    show(f"example, {count} rows", ratios, spent)
+    show("example", f"{count} rows, {seeds} seeds", ratios, spent)
 
 
-def show(name, ratios, spent):
-    """Print one line."""
-    cpu, clock = np.median(spent, axis=0)
-    print(f"{name:<22}{cpu:>7.2f}{clock:>9.2f}" + "".join(f"{r:>9.4f}" for r in ratios))
+def show(name, size, ratios, spent, peak=None):
+    """A row; from 20 seeds on its note has the worst ratios to errors of 1e6 plain draws."""
+    of = ", ".join(f"{what} {r:.3f}" for what, r in zip(("u", "low", "high"), ratios, strict=True))
+    note = f"rms error of a run to the standard error of 1e6 plain draws, the worst row: {of}"
+    note = note if len(spent) >= ENOUGH_SEEDS else ""
+    tell(Row(f"Monte Carlo, {name}", size, tuple(spent[:, 0]), memory_mb=peak, note=note))
 
 
 if __name__ == "__main__":

@@ -16,6 +16,8 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from measured import Row, tell
+
 from tankcal.planning import load_plan, predict
 from tankcal.planning.changes import changes_of
 from tankcal.planning.improvements import greedy
@@ -33,17 +35,17 @@ CANDIDATES = 20
 
 
 def main(rounds):
-    """Print a line for each measurement."""
+    """A row for each measurement."""
     with tempfile.TemporaryDirectory() as folder:
         for path in PLAN.iterdir():
             (Path(folder) / path.name).write_bytes(path.read_bytes())
         enlarge(Path(folder) / "plan.toml")
         for what in ("in a new process", "again"):
-            timed(f"60 photographs of 3000 targets, {what}", lambda: answered(folder))
+            timed(f"plan, {what}", "60 photographs, 3000 targets", lambda: answered(folder))
     small = load_plan(PLAN)
     unlimited = replace(small, limits=replace(small.limits, relative_u=None))
-    name = f"greedy, {rounds} rounds of {CANDIDATES} candidates"
-    path = timed(name, lambda: greedy(unlimited, steps=rounds, changes=candidates))
+    size = f"{rounds} rounds of {CANDIDATES} candidates"
+    path = timed("plan, greedy", size, lambda: greedy(unlimited, steps=rounds, changes=candidates))
     print(f"  {path.tried} plans tried, U/V {path.start_u:.6f} to {path.relative_u:.6f}")
 
 
@@ -69,12 +71,11 @@ def candidates(plan):
     return changes_of(plan, ("add", "repeat"))[:CANDIDATES]
 
 
-def timed(what, work):
-    """What `work` returns; its wall and processor seconds are printed."""
-    wall, processor = time.perf_counter(), time.process_time()
+def timed(name, size, work):
+    """What `work` returns; its seconds are a row."""
+    start = time.process_time()
     found = work()
-    spent = time.perf_counter() - wall, time.process_time() - processor
-    print(f"{what}: {spent[0]:.2f} s, {spent[1]:.2f} s of processor")
+    tell(Row(name, size, (time.process_time() - start,)))
     return found
 
 

@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 import trimesh
 from job_builder import write_job
+from measured import Row, tell
 
 import tankcal
 
@@ -41,7 +42,7 @@ UNCERTAINTY = [
 
 
 def main():
-    """Print triangles, the shape of the corrections, and seconds of the run."""
+    """A row with triangles and the shape of the corrections."""
     mesh = trimesh.creation.icosphere(subdivisions=6, radius=10.0)
     with tempfile.TemporaryDirectory() as folder:
         job = tankcal.load(
@@ -56,7 +57,8 @@ def main():
         start = time.process_time()
         result = tankcal.run(job, simulated=False)
     seconds = time.process_time() - start
-    print(f"{len(mesh.faces)} triangles, {result.ship.state.shape}: {seconds:.1f} s")
+    shape = " x ".join(map(str, result.ship.state.shape))
+    tell(Row("ship, trim and list", f"{len(mesh.faces)} triangles, {shape}", (seconds,)))
 
 
 if __name__ == "__main__":

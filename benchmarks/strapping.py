@@ -1,4 +1,4 @@
-"""Processor time of a strapping workbook to its table, median of five or $ROUNDS processes.
+"""Processor time of a strapping workbook to its table.
 
     python benchmarks/strapping.py
 
@@ -10,7 +10,6 @@ figure has all of it.
 
 import os
 import resource
-import statistics
 import subprocess
 import sys
 import tempfile
@@ -18,8 +17,9 @@ from pathlib import Path
 
 import numpy as np
 import xlsxwriter
+from measured import ROUNDS, Row, tell
 
-RUNS, COURSES, HEIGHT_M = int(os.environ.get("ROUNDS", 5)), 8, 1.5
+COURSES, HEIGHT_M = 8, 1.5
 JOB = {
     "tank.id": "E-8",
     "tank.kind": "vertical",
@@ -79,19 +79,18 @@ def write_workbook(path):
 
 
 def main():
-    """Print the processor time of a process, and of a second run in one."""
+    """Rows of a process, and of a second run in one."""
     with tempfile.TemporaryDirectory() as folder:
         book = Path(folder) / "tank.xlsx"
         write_workbook(book)
         alone, again = [], []
-        for _ in range(RUNS):
+        for _ in range(ROUNDS):
             before = _spent()
             again.append(float(_python(TWICE.format(book=str(book), folder=folder))))
             whole = _spent() - before
             alone.append(whole - again[-1])
     for name, seconds in (("process of one run", alone), ("second run in a process", again)):
-        text = f"{statistics.median(seconds):.2f} s (worst {max(seconds):.2f} s)"
-        print(f"strapping workbook of {COURSES} courses, {name}: {text}")
+        tell(Row(f"strapping workbook, {name}", f"{COURSES} courses", tuple(seconds)))
 
 
 def _python(code):

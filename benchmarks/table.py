@@ -4,18 +4,16 @@
 
 The shipped example with every part that a vertical tank may have: plate, paint, temperature, tilt,
 head of the liquid, cone bottom, deadwood, floating roof, and every input declared. The goal: 9 500
-rows with their low-rank covariance in under 10 ms. Median of 20 interleaved rounds on one core.
+rows with their low-rank covariance in under 10 ms. 20 interleaved rounds on one core.
 """
 
 import os
-import statistics
-import time
 from dataclasses import replace
-from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from measured import ROOT, Row, interleaved, tell
 
 import tankcal
 from tankcal.job import Bottom, Deadwood, DeclaredInput, Roof
@@ -24,7 +22,6 @@ from tankcal.tank.deliveries import worst_deliveries
 from tankcal.tank.heads import End
 from tankcal.tank.solids import LyingTank
 
-ROOT = Path(__file__).resolve().parent.parent
 ROUNDS, STEP_M = 20, 0.001
 
 
@@ -52,14 +49,11 @@ def lying_tanks():
         "unequal ends": LyingTank(2.4, 2.4, 10.0, end, other),
         "tilted": LyingTank(2.4, 2.4, 10.0, end, other, tilt=0.02, dip_from_a_m=5.0),
     }
-    return {
-        f"2500 rows lying, {name}": lambda tank=tank: tank.volume_m3(dip)
-        for name, tank in tanks.items()
-    }
+    return {f"lying, {name}": lambda tank=tank: tank.volume_m3(dip) for name, tank in tanks.items()}
 
 
 def main():
-    """Print a row for each step."""
+    """A row for each step."""
     result = tankcal.run(furnished(tankcal.load(ROOT / "examples" / "silva-1995")))
     body = result.body
     levels = np.arange(0, body.highest_m, STEP_M)
@@ -70,19 +64,13 @@ def main():
         "worst delivery of 2 m or more": lambda: worst_deliveries(table, 2.0),
         **lying_tanks(),
     }
-    seconds = {name: [] for name in tasks}
-    for _ in range(ROUNDS):
-        for name, task in tasks.items():
-            start = time.perf_counter()
-            task()
-            seconds[name].append(time.perf_counter() - start)
     sources = body.sources(levels)
     columns = sum(source.columns_m3.shape[1] for source in sources)
     print(f"{len(levels)} rows of {1000 * STEP_M:g} mm, {len(body.parts)} parts")
     print(f"{len(sources)} causes of uncertainty in {columns} columns")
-    print(f"{'step':<30}{'median ms':>10}{'worst ms':>10}")
-    for name, values in seconds.items():
-        print(f"{name:<30}{1e3 * statistics.median(values):>10.2f}{1e3 * max(values):>10.2f}")
+    for name, seconds in interleaved(tasks, ROUNDS).items():
+        size = "2500 rows" if "lying" in name else f"{len(levels)} rows, {columns} columns"
+        tell(Row(f"table, {name}", size, seconds))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,5 @@
 """The uncertainty of every row of a table of 1 mm, beside GTC and `uncertainties`.
 
-    pip install GTC uncertainties
     python benchmarks/uncertainty.py [rows]        (default: 9500)
 
 A tank of eight courses with a ring of fourteen points each, and 130 inputs: 112 radii with a full
@@ -14,12 +13,10 @@ memory: where the system is slow to hand out pages, that is a third of its time.
 The peers have the same inputs and the tank in plain arithmetic (`Plain`), as lean as can be: one
 area for each course, made once. They give value and u. Each has 20 s in five interleaved rounds for
 rows from all over the table, extrapolated to the whole of it. What is made once (the areas and
-their covariance) is counted for nobody and shown apart. The same arithmetic with imaginary steps
-gives the whole Jacobian J, hence u from J C J' without any of the programs. Medians, one core. A
-peer that is not installed is left out.
+their covariance) is counted for nobody. The same arithmetic with imaginary steps gives the whole
+Jacobian J, hence u from J C J' without any of the programs: the right answer.
 """
 
-import importlib
 import os
 import sys
 import time
@@ -28,6 +25,7 @@ from dataclasses import dataclass, replace
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from measured import ROUNDS, Row, digits_of, interleaved, peer_module, tell
 from scipy.linalg import block_diag
 
 from tankcal.geometry.field.estimate import LEVELS
@@ -40,7 +38,8 @@ from tankcal.tank.fittings import deadwood
 from tankcal.tank.volumes import ShellVolume
 from tankcal.uncertainty import combine, group_correlated
 
-ROUNDS, PEER_S, TABLES = 5, 4.0, 20  # of ours, in a round
+PEER_S, TABLES = 4.0, 20  # seconds of a peer, tables of ours, in a round
+LEAST = 12.0
 HEIGHT_M, COURSES, POINTS, RADIUS_M = 9.5004, 8, 14, 6.5
 COURSE_M, RADII = HEIGHT_M / COURSES, COURSES * POINTS
 JOINTS_M = COURSE_M * np.arange(COURSES)  # never at a row: the area jumps there
@@ -232,91 +231,71 @@ def with_uncertainties(package, case):
     return np.array(inputs, dtype=object), lambda found: (found.nominal_value, found.std_dev)
 
 
-def now():
-    """(2,) seconds by clock and by processor."""
-    return np.array([time.perf_counter(), time.process_time()])
-
-
 class Peer:
     """Another program at work on the table: found is {row: (volume, u)} so far."""
 
     def __init__(self, make, package, case):
-        start = now()
         inputs, self.read = make(package, case)
         self.plain = Plain(inputs)
         for one in (*self.plain.area, *self.plain.below[1:]):
             self.read(one)  # `uncertainties` keeps the derivatives from then on
-        self.made_s = (now() - start)[0]
         heights, course, barrels, parts = (one.T.tolist() for one in rows_of(case))
         self.rows = list(zip(heights, course, barrels, parts, strict=True))
         self.order = np.random.default_rng(1).permutation(len(self.rows)).tolist()
         self.found, self.done = {}, 0
 
-    def table_s(self, seconds):
-        """Seconds of the whole table by clock and by processor, from the rows of some seconds."""
-        start, first = now(), self.done
-        while now()[0] - start[0] < seconds:
+    def table_s(self, seconds=PEER_S):
+        """Seconds of processor of the whole table, from the rows of some seconds."""
+        start, first = time.process_time(), self.done
+        while time.process_time() - start < seconds:
             row = self.order[self.done % len(self.order)]
             self.found[row] = self.read(self.plain.volume_m3(*self.rows[row]))
             self.done += 1
-        return (now() - start) / (self.done - first) * len(self.rows)
-
-
-def installed_peers(case):
-    """{name: Peer} of those that are there; a line for each that is not."""
-    peers = {}
-    for name, make in (("GTC", with_gtc), ("uncertainties", with_uncertainties)):
-        try:
-            package = importlib.import_module(name)
-        except ImportError:
-            print(f"{name} is not installed: left out")
-        else:
-            peers[name] = Peer(make, package, case)
-    return peers
-
-
-def differences(values, u, truth, rows):
-    """Number of rows, and the largest relative differences of volume and of u from the truth."""
-    pairs = zip((values, u), truth, strict=True)
-    volume, of_u = (np.max(np.abs(one / of[rows] - 1)) for one, of in pairs)
-    return f"{len(u):>10}{volume:>10.0e}{of_u:>10.0e}"
+        return (time.process_time() - start) / (self.done - first) * len(self.rows)
 
 
 def main():
-    """Print a row for each program."""
+    """A row for each peer."""
     case = case_of(int(sys.argv[1]) if len(sys.argv) > 1 else 9500)
-    truth, peers, start = dense(case), installed_peers(case), now()
-    body = body_of(case)
-    made = {"tankcal": (now() - start)[0], **{name: one.made_s for name, one in peers.items()}}
-    spent = {name: [] for name in made}
-    for _ in range(ROUNDS):
+    truth, body, peers = dense(case), body_of(case), {}
+    name = "uncertainty of a table"
+    size = f"{len(case.heights_m)} rows, {len(case.estimates)} inputs"
+    for package, make in (("GTC", with_gtc), ("uncertainties", with_uncertainties)):
+        if found := peer_module(package, name):
+            peers[package] = found[1], Peer(make, found[0], case)
+
+    def ours():
+        start = time.process_time()
         for _ in range(TABLES):
-            start = now()
-            found = table_of(body, case.heights_m)
-            spent["tankcal"].append(now() - start)
-        for name, peer in peers.items():
-            spent[name].append(peer.table_s(PEER_S))
-    told = {"tankcal": differences(*found[:2], truth, slice(None))}
-    for name, peer in peers.items():
-        rows, values = list(peer.found), np.transpose(list(peer.found.values()))
-        told[name] = differences(*values, found[:2], rows)
-    print(f"{len(case.heights_m)} rows, {len(case.estimates)} inputs; seconds of the whole table")
-    print("largest relative differences: of tankcal from J C J', of the peers from tankcal")
-    columns = ("made once", "clock", "worst", "processor", "by ours", "rows", "volume", "u")
-    print(f"{'program':<14}" + "".join(f"{one:>10}" for one in columns))
-    own = np.median(spent["tankcal"], axis=0)[0]
-    for name, times in spent.items():
-        (clock, cpu), worst = np.median(times, axis=0), np.max(times, axis=0)[0]
-        row = f"{name:<14}{made[name]:>10.4f}{clock:>10.4f}{worst:>10.4f}{cpu:>10.4f}"
-        print(f"{row}{clock / own:>10.0f}{told[name]}")
-    print(f"\n{'step':<44}{'processor ms':>14}{'worst':>10}")
+            table_of(body, case.heights_m)
+        return (time.process_time() - start) / TABLES
+
+    def digits(values, u, rows):
+        return min(digits_of(one, of[rows]) for one, of in zip((values, u), truth, strict=True))
+
+    own = digits(*table_of(body, case.heights_m)[:2], slice(None))
+    for _, peer in peers.values():
+        peer.table_s(PEER_S / 8)
+    tasks = {"tankcal": ours, **{one: peer.table_s for one, (_, peer) in peers.items()}}
+    seconds = interleaved(tasks, ROUNDS)
+    about = {"answer": "volumes and u, J C J'", "least": LEAST}
+    for package, (version, peer) in peers.items():
+        theirs = digits(*np.transpose(list(peer.found.values())), list(peer.found))
+        note = "some of the rows, extrapolated" * (len(peer.found) < len(peer.rows))
+        tell(Row(name, size, seconds["tankcal"], package, version, seconds[package],
+                 digits=(own, theirs), note=note, **about))  # fmt: skip
+    if not peers:
+        tell(Row(name, size, seconds["tankcal"], digits=(own, None), **about))
     for what, task in steps_of(body, case.heights_m).items():
-        times = []
-        for _ in range(ROUNDS * TABLES):
-            start = now()
-            task()
-            times.append(1e3 * (now() - start)[1])
-        print(f"{what:<44}{np.median(times):>14.2f}{max(times):>10.2f}")
+        tell(Row(f"step of it: {what}", size, interleaved({"": lambda: of_many(task)}, ROUNDS)[""]))
+
+
+def of_many(task):
+    """Seconds of processor of a task that is over in a fraction of a millisecond."""
+    start = time.process_time()
+    for _ in range(TABLES):
+        task()
+    return (time.process_time() - start) / TABLES
 
 
 if __name__ == "__main__":

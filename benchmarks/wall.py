@@ -1,14 +1,13 @@
-"""Time and memory from points to the table's volumes, by number of points: medians of $ROUNDS.
+"""Processor time and memory from points to the table's volumes, by number of points.
 
     python benchmarks/wall.py
 
 Ten courses of 2 m, R 7.5 m, oval, bulging, with one seam and noise of 2 mm; points anywhere on the
 wall. Each size runs in a process of its own with one BLAS thread, and the sizes take turns. Beside
-the seconds stands their ratio to those of the Cholesky factor of a matrix of 1600, the largest that
-the field of a wall takes. The goals: 1200 points in 0.5 s, 50 000 in 5 s and 1 GB. The first is
-met where the machine is not busy: 0.43 s of processor time in November 2026 (the version before
-0.45; four runs of each in turns), 0.53 s (0.54) beside ten other programs. A third of it is the
-likelihood of the sizes of the wall's components, an eighth factors of its covariance.
+the seconds stands their ratio to those of the Cholesky factor of a matrix of 1600, the largest
+that the field of a wall takes. The goals: 1200 points in 0.5 s, 50 000 in 5 s and 1 GB. A third of
+the time of 1200 points is the likelihood of the sizes of the wall's components, an eighth factors
+of its covariance.
 """
 
 import os
@@ -20,7 +19,9 @@ import tempfile
 import time
 from pathlib import Path
 
-SIZES, ROUNDS = (384, 1200, 50_000), int(os.environ.get("ROUNDS", 5))
+from measured import ROUNDS, Row, tell
+
+SIZES = (384, 1200, 50_000)
 JOB = """[tank]
 id = "BENCH"
 kind = "vertical"
@@ -38,7 +39,7 @@ reference_temperature_c = 15
 
 
 def main():
-    """Print a line for each size."""
+    """A row for each size."""
     found = {size: [] for size in SIZES}
     for _ in range(ROUNDS):
         for size in SIZES:
@@ -48,11 +49,12 @@ def main():
             found[size].append([float(one) for one in out.split()])
     for size, rows in found.items():
         told, fitted, table, unit, megabytes = map(statistics.median, zip(*rows, strict=True))
-        whole = told + fitted + table
-        print(
-            f"{size} points: told from clutter {told:.2f} s, field {fitted:.2f} s, volumes with u "
-            f"{table:.2f} s; {whole:.2f} s in all, {whole / unit:.0f} factors; {megabytes:.0f} MB"
+        whole = tuple(sum(row[:3]) for row in rows)
+        note = (
+            f"told from clutter {told:.2f} s, field {fitted:.2f} s, volumes with u {table:.2f} s; "
+            f"{statistics.median(whole) / unit:.0f} Cholesky factors of 1600"
         )
+        tell(Row("points to volumes", f"{size} points", whole, memory_mb=megabytes, note=note))
 
 
 def once(size):
@@ -78,18 +80,18 @@ def once(size):
         rows = "\n".join(f"P{i},{x:.5f},{y:.5f},{h:.5f}" for i, (x, y, h) in enumerate(xyz))
         Path(folder, "points.csv").write_text(f"point,x_m,y_m,z_m\n{rows}\n")
         job = tankcal.load(folder)
-    times = [time.perf_counter()]
+    times = [time.process_time()]
     shell = find_shell(job.points.xyz_m, np.arange(0.0, 21.0, 2.0), 7.5)
-    times.append(time.perf_counter())
+    times.append(time.process_time())
     wall = fit_wall(job, shell)
-    times.append(time.perf_counter())
+    times.append(time.process_time())
     body_of(job, wall).rows(np.linspace(0.0, 19.9, 2000))
-    times.append(time.perf_counter())
+    times.append(time.process_time())
     matrix = np.eye(1600) + 0.1 * np.exp(-np.abs(np.subtract.outer(*2 * [np.arange(1600.0)])) / 100)
     scipy.linalg.cholesky(matrix)
-    start = time.perf_counter()
+    start = time.process_time()
     scipy.linalg.cholesky(matrix)
-    unit = time.perf_counter() - start
+    unit = time.process_time() - start
     print(*np.diff(times), unit, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 
 

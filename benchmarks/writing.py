@@ -23,8 +23,8 @@ import time
 from pathlib import Path
 
 import numpy as np
+from measured import ROOT, Row, tell
 
-ROOT = Path(__file__).resolve().parent.parent
 C_MM, HEIGHT_M, HALF_MM = 35.0, 60.0, (18.0, 12.0)
 SD_UM = 2.0
 SIZES = {"large": (60, 26_321), "small": (6, 12)}
@@ -169,8 +169,9 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         for name, (photos, points) in SIZES.items():
             job = Path(folder) / name
-            size = write_block(job, photos, points)
-            print(f"{name}: " + ", ".join(f"{count} {what}" for what, count in size.items()))
+            counts = write_block(job, photos, points)
+            size = ", ".join(f"{count} {what}" for what, count in counts.items())
+            print(f"{name}: {size}")
             runs = {tree: [] for tree in options.trees}
             for _ in range(options.runs):
                 for tree in options.trees:
@@ -181,6 +182,10 @@ def main():
                     median = statistics.median(one[key] for one in found)
                     what, unit = key.rsplit("_", 1)
                     print(f"    {what}: {median:.1f} {unit}")
+            for what in ("computing", "writing", "whole command"):
+                seconds = tuple(one[f"{what}, processor_s"] for one in runs[options.trees[0]])
+                papers = "no papers" if options.no_papers else "all papers"
+                tell(Row(f"a block, {what}", f"{size}, {papers}", seconds))
     return None
 
 

@@ -4,7 +4,8 @@
 
 Markdown pages are copied as they are, so that links between them hold on a plain git host and on
 the site; a link to a file that has no page becomes plain text. A notebook becomes a page of its
-texts, code and results; one that was not executed is shown without results, and that is told.
+texts, code and results; one that was not executed is shown without results, and that is told. The
+page of the benchmarks shows the last `make bench` here, or else the run that it was kept with.
 """
 
 import base64
@@ -20,6 +21,7 @@ from tankcal.report.latex_math import formula
 ROOT = Path(__file__).resolve().parent.parent
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^()\s]+)\)")
 MATH = re.compile(r"(?<![\\$])\$([^$\n]+)\$(?!\$)")
+RESULTS = ROOT / "build/benchmarks.json"
 PAGES = ("docs/*.md", "CHANGELOG.md", "CONTRIBUTING.md", "examples/*/README.md")
 DOORS = {  # rooms of the reference, in the order in which a job goes through them
     "tankcal": ("tankcal", "tankcal.errors"),
@@ -82,6 +84,8 @@ def main(target, executed):
             text = from_root(with_contents(text, notebooks))
             put(target / "index.md", with_links(text, ROOT, staged))
             continue
+        if path == ROOT / "docs/benchmarks.md" and RESULTS.exists():
+            text = with_results(text)
         put(target / path.relative_to(ROOT), with_links(text, path.parent, staged))
     shutil.copytree(ROOT / "docs/images", target / "docs/images")
     for path in notebooks:
@@ -103,6 +107,16 @@ def put(path, text):
     """Write a page and the folder that it stands in."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")
+
+
+def with_results(text):
+    """The page of the benchmarks with the tables of the last `make bench` here."""
+    sys.path.insert(0, str(ROOT / "benchmarks"))
+    from guard import RELEASED
+    from page import filled
+
+    results, released = (json.loads(one.read_text(encoding="utf-8")) for one in (RESULTS, RELEASED))
+    return filled(text, results, released)
 
 
 def slug(title):

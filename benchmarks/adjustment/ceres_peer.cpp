@@ -6,12 +6,13 @@
 // Then one command a line on standard input, one line of JSON on standard output for each:
 //   solve SOLVER RADIUS FTOL        from the start values; RADIUS is initial_trust_region_radius
 //   covariance full | marginal      of all points, at the last solution
+//   version                         of Ceres
 // SOLVER: SPARSE_NORMAL_CHOLESKY (Ceres' default), SPARSE_SCHUR, DENSE_SCHUR
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
-#include <chrono>
 #include <cstdio>
+#include <ctime>
 #include <fstream>
 #include <iostream>
 #include <memory>
@@ -25,9 +26,10 @@ constexpr int kInterior = 10;
 // Unknowns are multiples of these: raw K1..K3 per mm^2.. make Ceres' covariance call it singular.
 const double kUnit[kInterior] = {1, 1, 1, 1e-8, 1e-12, 1e-16, 1e-7, 1e-7, 1e-4, 1e-4};
 
-double Now() {
-  using namespace std::chrono;
-  return duration<double>(steady_clock::now().time_since_epoch()).count();
+double Now() {  // seconds of processor
+  timespec now;
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return now.tv_sec + 1e-9 * now.tv_nsec;
 }
 
 // Distortion added to the ideal coordinate; the formulas of sim_tank.py.
@@ -226,5 +228,6 @@ int main(int argc, char** argv) {
     words >> command >> what >> radius >> ftol;
     if (command == "solve") Solve(&peer, what, radius, ftol);
     if (command == "covariance") PointCovariance(&peer, what);
+    if (command == "version") std::printf("{\"version\": \"%s\"}\n", CERES_VERSION_STRING);
   }
 }

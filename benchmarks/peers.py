@@ -1,0 +1,55 @@
+"""Makes the environment of the benchmarks: the one of tankcal with the peers on top of it.
+
+    python benchmarks/peers.py .venv/peers
+
+The peers are the extra `peers` of pyproject.toml. Each is installed by itself; what cannot be is
+kept with the installer's last words in errors.json there, and the page of the benchmarks names it.
+Nothing is installed beside tankcal itself: its tests run without any of this.
+"""
+
+import json
+import re
+import subprocess
+import sys
+import sysconfig
+import tomllib
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def main(folder):
+    """Make the environment, and install each peer."""
+    venv.create(folder, with_pip=True)
+    python = Path(folder) / "bin" / "python"
+    ask = [python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"]
+    inside = subprocess.run(ask, check=True, capture_output=True, text=True).stdout.strip()
+    Path(inside, "below.pth").write_text(
+        f"import site; site.addsitedir({sysconfig.get_path('purelib')!r})\n"
+    )
+    errors = {}
+    for peer in wanted():
+        command = [python, "-m", "pip", "install", "--quiet", peer]
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode:
+            name = re.match(r"[\w.-]+", peer).group()
+            errors[name] = told(done.stderr)
+            print(f"{name} could not be installed: {errors[name]}")
+    (Path(folder) / "errors.json").write_text(json.dumps(errors, indent=1), encoding="utf-8")
+
+
+def wanted():
+    """The requirements of the extra."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    return settings["project"]["optional-dependencies"]["peers"]
+
+
+def told(text):
+    """The last error of the installer, one line, without the addresses that it tried."""
+    lines = [line for line in text.splitlines() if line.startswith("ERROR")] or [text.strip()]
+    return re.sub(r"\w+://\S+", "...", lines[-1].removeprefix("ERROR: "))[:200]
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
