@@ -409,6 +409,8 @@ def image_rows(*arguments, in_ideal=False):
         Misclosures of the ideal image (`ideal_point_derivatives`) instead of the measured one.
     """
     if is_worth_compiling(len(arguments[6])):
-        compile_functions(sys.modules[__name__], _COMPILED)._loop(*arguments, in_ideal)
+        loops = compile_functions(sys.modules[__name__], _COMPILED)
+        state = (np.ascontiguousarray(one) for one in arguments[:4])  # compiled for these alone
+        loops._loop(*state, *arguments[4:], in_ideal)
     else:
         _arrays(*arguments, in_ideal)

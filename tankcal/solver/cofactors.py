@@ -46,7 +46,7 @@ class Factor:
             inverse = self.tangent.from_null_space(self.tangent.from_null_space(inverse).T)
         inverse *= self.scale
         inverse *= self.scale[:, None]
-        return inverse
+        return np.ascontiguousarray(inverse)
 
     def whitened(self, columns):
         """L^-1 D columns, so that columns' S^-1 columns is a sum of squares; columns (nr, k)."""

@@ -94,7 +94,7 @@ def roots(normals):
 def block_cofactors(plan, normals, inverse):
     """Cofactors (nb, 3, 3) of all blocks, and (t, 3) of each block with its reduced columns.
 
-    inverse  (nr, nr) cofactor matrix of the reduced unknowns
+    inverse  (nr, nr) cofactor matrix of the reduced unknowns, row by row
     """
     cross, out = np.empty((len(plan.columns) + 1, 3)), np.empty((plan.blocks, 3, 3))
     cross[-1] = 0.0

@@ -200,7 +200,8 @@ def plan(reduced, blocks, groups):
     for g, group in enumerate(groups):
         for rows, order, block, columns in _split(group.columns, reduced, blocks):
             cuts = _cuts(columns, reduced)
-            raw.append((g, rows, order, block, cuts, columns[:, cuts[:-1]].astype(np.int32)))
+            first = np.ascontiguousarray(columns[:, cuts[:-1]], dtype=np.int32)
+            raw.append((g, rows, order, block, cuts, first))
     together = np.zeros((blocks, reduced + 1), dtype=bool)
     for _, _, _, block, cuts, first in raw:
         if block is not None:
