@@ -171,10 +171,10 @@ def _back(v, wide, b, starts, columns, reduced, out):
     for o in range(len(b)):
         x0, x1, x2 = b[o, 0], b[o, 1], b[o, 2]
         for a in range(starts[o], starts[o + 1]):
-            line, r = wide[a], reduced[columns[a]]
-            x0 += line[0] * r
-            x1 += line[1] * r
-            x2 += line[2] * r
+            r = reduced[columns[a]]
+            x0 += wide[a, 0] * r
+            x1 += wide[a, 1] * r
+            x2 += wide[a, 2] * r
         x2 = x2 / v[o, 5]
         x1 = (x1 - v[o, 4] * x2) / v[o, 2]
         x0 = (x0 - v[o, 1] * x1 - v[o, 3] * x2) / v[o, 0]

@@ -207,18 +207,17 @@ def plan(reduced, blocks, groups):
         if block is not None:
             _mark(together, block, cuts, first)
     together[:, reduced] = False
-    place = np.cumsum(together, dtype=np.int32).reshape(together.shape)
-    starts = np.append(0, place[:, reduced]).astype(np.int64)
-    place -= 1
-    place[:, reduced] = starts[-1]
-    columns = np.nonzero(together)[1].astype(np.int32)
+    met = np.flatnonzero(together)
+    starts = np.searchsorted(met, np.arange(blocks + 1) * (reduced + 1))
+    owner = np.repeat(np.arange(blocks, dtype=np.int32), np.diff(starts))
+    columns = (met - owner * np.int64(reduced + 1)).astype(np.int32)
+    place = np.full((blocks, reduced + 1), len(met), dtype=np.int32)
+    place.ravel()[met] = np.arange(len(met), dtype=np.int32)
     batches = tuple(
         Batch(*fields, None if fields[3] is None else place[fields[3][:, None], fields[-1]])
         for fields in raw
     )
-    begins = together.copy()
-    begins[:, 1:] &= ~together[:, :-1]
-    ends = np.append(place[begins], len(columns))
+    ends = np.flatnonzero(np.diff(met, prepend=-2, append=-2) != 1)
     changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
     alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
     runs = np.searchsorted(ends, starts)
