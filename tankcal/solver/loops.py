@@ -7,6 +7,9 @@ For the rows of a batch with derivatives E by their block and F by reduced unkno
 and for each block, V = L L', the wide part becomes Y = wide L^-T and b becomes y = L^-1 b, so that
 the reduced equations are S - Y Y' and g - Y y. S is kept as a matrix T in which each pair of
 unknowns stands once: S = T + T' - diag T.
+
+In the innermost loops places are counted without a sign (np.uintp): numba tests at each number
+whether one that might be negative is counted from the end.
 """
 
 import numpy as np
@@ -129,14 +132,17 @@ def _forward_all(v, part, b, y, g, columns):
 def _leave(t, columns, runs, first, y, product):
     """Take Y'Y, its upper half, from the places of its columns in t; y (3 blocks, n)."""
     np.dot(y.T, y, product)
+    n, width = len(columns), t.shape[1]
+    flat, part = t.reshape(t.size), product.reshape(product.size)
     for one in range(len(runs) - 1):
-        for a in range(runs[one] - first, runs[one + 1] - first):
-            to = columns[a]
+        edge = runs[one] - first
+        for a in range(runs[one + 1] - runs[one]):
             for other in range(one, len(runs) - 1):
-                edge = runs[other] - first
-                by = columns[edge] - edge
-                for q in range(max(a, edge), runs[other + 1] - first):
-                    t[to, by + q] -= product[a, q]
+                begin = max(edge + a, runs[other] - first)
+                to = np.uintp((columns[edge] + a) * width + columns[begin])
+                of = np.uintp((edge + a) * n + begin)
+                for q in range(np.uintp(runs[other + 1] - first - begin)):
+                    flat[to + q] -= part[of + q]
 
 
 def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, smallest):
@@ -168,13 +174,15 @@ def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, sm
 
 
 def _back(v, wide, b, starts, columns, reduced, out):
+    flat, one, two, three = wide.reshape(wide.size), np.uintp(1), np.uintp(2), np.uintp(3)
     for o in range(len(b)):
         x0, x1, x2 = b[o, 0], b[o, 1], b[o, 2]
-        for a in range(starts[o], starts[o + 1]):
-            r = reduced[columns[a]]
-            x0 += wide[a, 0] * r
-            x1 += wide[a, 1] * r
-            x2 += wide[a, 2] * r
+        first = np.uintp(starts[o])
+        for a in range(np.uintp(starts[o + 1] - starts[o])):
+            r, at = reduced[np.uintp(columns[first + a])], three * (first + a)
+            x0 += flat[at] * r
+            x1 += flat[at + one] * r
+            x2 += flat[at + two] * r
         x2 = x2 / v[o, 5]
         x1 = (x1 - v[o, 4] * x2) / v[o, 2]
         x0 = (x0 - v[o, 1] * x1 - v[o, 3] * x2) / v[o, 0]
