@@ -328,8 +328,10 @@ def _image_groups(survey, used, layout, reduced, table):
             order = order[np.argsort(key[order], kind="stable")]
         eliminated = np.count_nonzero(key[order] < last)
         part = np.minimum(np.arange(len(order)), eliminated) // PART
-        part[eliminated:] = len(order)
-        order = order[np.lexsort((images.photo[order], part))]
+        part[eliminated:] += 1
+        of_photo = part * len(survey.photos.names) + images.photo[order]
+        small = np.min_scalar_type(of_photo.max(initial=0))  # sorted faster
+        order = order[np.argsort(of_photo.astype(small), kind="stable")]
         active = np.flatnonzero((left < layout.interior.size - 1).any(axis=0))
         active = active[(layout.interior[left[:, active]] >= 0).any(axis=0)]
         one = replace(images.taken(order), form=form, active=active, interior_of=table)
