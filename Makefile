@@ -85,6 +85,7 @@ wheel: $(VENV)/release ## wheel and source archive in dist/, built twice and com
 $(VENV)/base: pyproject.toml constraints.txt
 	test -x $(BIN)/python || python3 -m venv $(VENV)
 	$(BIN)/pip install --quiet --editable .
+	$(BIN)/python -m tankcal.cli.kernels
 	touch $@
 
 $(VENV)/full: $(VENV)/base

@@ -306,12 +306,23 @@ def _loop(
     xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac,
     in_ideal,
 ):  # fmt: skip
-    """image_rows, one image point after the other."""
+    """image_rows, one image point after the other; places are named one by one, for a part of an
+    array costs more than a number."""
     for i in range(len(point)):
-        p, s, r, q = xyz[point[i]], photo_xyz[photo[i]], rotation[photo[i]], interior[photo[i]]
-        ground = (p[0] - s[0], p[1] - s[1], p[2] - s[2])
-        turn = (r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2])
-        own = (q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], q[8], q[9], q[10], q[11], q[12])
+        j, f = point[i], photo[i]
+        ground = (
+            xyz[j, 0] - photo_xyz[f, 0], xyz[j, 1] - photo_xyz[f, 1], xyz[j, 2] - photo_xyz[f, 2]
+        )  # fmt: skip
+        turn = (
+            rotation[f, 0, 0], rotation[f, 0, 1], rotation[f, 0, 2],
+            rotation[f, 1, 0], rotation[f, 1, 1], rotation[f, 1, 2],
+            rotation[f, 2, 0], rotation[f, 2, 1], rotation[f, 2, 2],
+        )  # fmt: skip
+        own = (
+            interior[f, 0], interior[f, 1], interior[f, 2], interior[f, 3], interior[f, 4],
+            interior[f, 5], interior[f, 6], interior[f, 7], interior[f, 8], interior[f, 9],
+            interior[f, 10], interior[f, 11], interior[f, 12],
+        )  # fmt: skip
         if in_ideal:
             mx, my = xy[i, 0], xy[i, 1]
             x, y, dx, dy = ideal_point_derivatives(ground, turn, own, (mx, my), form, of_ideal)
@@ -323,17 +334,14 @@ def _loop(
         w[i, 1] = y * wy
         if len(jac) == 0:
             continue
-        gx, gy = jac[i, 0], jac[i, 1]
         for k in range(3):
-            gx[k] = dx[k] * wx
-            gy[k] = dy[k] * wy
-            gx[3 + k] = -gx[k]
-            gy[3 + k] = -gy[k]
-            gx[6 + k] = dx[3 + k] * wx
-            gy[6 + k] = dy[3 + k] * wy
+            gx, gy = dx[k] * wx, dy[k] * wy
+            jac[i, 0, k], jac[i, 1, k] = gx, gy
+            jac[i, 0, 3 + k], jac[i, 1, 3 + k] = -gx, -gy
+            jac[i, 0, 6 + k], jac[i, 1, 6 + k] = dx[3 + k] * wx, dy[3 + k] * wy
         for k in range(len(active)):
-            gx[9 + k] = dx[6 + active[k]] * wx
-            gy[9 + k] = dy[6 + active[k]] * wy
+            jac[i, 0, 9 + k] = dx[6 + active[k]] * wx
+            jac[i, 1, 9 + k] = dy[6 + active[k]] * wy
 
 
 _COMPILED = (
@@ -409,6 +417,8 @@ def image_rows(*arguments, in_ideal=False):
         Misclosures of the ideal image (`ideal_point_derivatives`) instead of the measured one.
     """
     if is_worth_compiling(len(arguments[6])):
-        compile_functions(sys.modules[__name__], _COMPILED)._loop(*arguments, in_ideal)
+        loops = compile_functions(sys.modules[__name__], _COMPILED)
+        state = (np.ascontiguousarray(one) for one in arguments[:4])  # compiled for these alone
+        loops._loop(*state, *arguments[4:], in_ideal)
     else:
         _arrays(*arguments, in_ideal)

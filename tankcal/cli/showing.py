@@ -96,9 +96,8 @@ def read_job(source, show, **options):
 
 
 def prepare_for_small_work():
-    """A second BLAS thread costs time with small matrices, a compiler with small surveys."""
+    """A second BLAS thread costs time with small matrices."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    os.environ.setdefault("TANKCAL_COMPILED", "patient")
 
 
 def warn(warnings):

@@ -46,7 +46,7 @@ class Factor:
             inverse = self.tangent.from_null_space(self.tangent.from_null_space(inverse).T)
         inverse *= self.scale
         inverse *= self.scale[:, None]
-        return inverse
+        return np.ascontiguousarray(inverse)
 
     def whitened(self, columns):
         """L^-1 D columns, so that columns' S^-1 columns is a sum of squares; columns (nr, k)."""
@@ -69,12 +69,22 @@ class Cofactors:
     """Cofactors of the unknowns of a Model, at its minimum, and of anything that hangs on them.
 
     model, plan, factor, conditions   of the solver; the Factor is that at the minimum
-    misclosures, jacobians            (n, m) and (n, m, K) whitened, one array a group
+    state, rows                       the minimum, and the Rows as evaluated there
     """
 
-    def __init__(self, work, factor):
+    def __init__(self, work, state, factor):
         self.model, self.plan, self.conditions = work.model, work.plan, work.conditions
-        self.factor, self.misclosures, self.jacobians = factor, tuple(work.w), tuple(work.jac)
+        self.factor, self.state, self.rows = factor, state, work.rows
+
+    @property
+    def misclosures(self):
+        """Whitened misclosures (n, m) at the minimum, one array a group."""
+        return self.rows.misclosures
+
+    @cached_property
+    def jacobians(self):
+        """Whitened derivatives (n, m, K) at the minimum, one array a group."""
+        return self.rows.derivatives(self.state)
 
     @cached_property
     def reduced_cofactors(self):

@@ -10,36 +10,27 @@ from tankcal.solver import loops
 from tankcal.solver.compiled import compile_functions, is_worth_compiling
 
 
-def build(plan, normals, misclosures, jacobians):
-    """Fill the Normals with the rows of all groups: w (n, m) and jac (n, m, K), one a group."""
-    normals.clear()
-    for batch in plan.batches:
-        _add_rows(
-            batch, batch.of(misclosures[batch.group]), batch.of(jacobians[batch.group]), normals
-        )
-
-
-def _add_rows(batch, w, jac, normals):
+def add_rows(batch, w, jac, normals):
+    """Add rows of a Batch, w (n, m) and jac (n, m, K), to the Normals."""
     if is_worth_compiling():
         run = compile_functions(loops, loops.COMPILED)
-        if batch.block is None:
-            run._add_plain_rows(w, jac, batch.columns, normals.t, normals.g)
-        else:
-            run._add_rows(
-                w, jac, batch.block, batch.columns, batch.places, batch.cuts,
-                normals.v, normals.wide, normals.b, normals.t, normals.g,
-            )  # fmt: skip
+        skip = 0 if batch.block is None else 3
+        run._add_squares(w, jac, skip, batch.first, batch.cuts, normals.t, normals.g)
+        if batch.block is not None:
+            run._add_blocks(
+                w, jac, batch.block, batch.place, batch.cuts, normals.v, normals.wide, normals.b
+            )
         return
-    f = jac
+    f, columns = jac, batch.columns
     if batch.block is not None:
         e, f = jac[:, :, :3], jac[:, :, 3:]
         square = np.einsum("nma,nmb->nab", e, e)
         np.add.at(normals.v, batch.block, square[:, *np.tril_indices(3)])
         np.add.at(normals.b, batch.block, np.einsum("nma,nm->na", e, w))
         np.add.at(normals.wide, batch.places, np.einsum("nmk,nma->nka", f, e))
-    np.add.at(normals.g, batch.columns, np.einsum("nmk,nm->nk", f, w))
+    np.add.at(normals.g, columns, np.einsum("nmk,nm->nk", f, w))
     once = np.triu(np.ones((f.shape[2],) * 2)) * np.einsum("nma,nmb->nab", f, f)
-    np.add.at(normals.t, (batch.columns[:, :, None], batch.columns[:, None, :]), once)
+    np.add.at(normals.t, (columns[:, :, None], columns[:, None, :]), once)
 
 
 def eliminate(plan, normals, damping, smallest):
@@ -103,7 +94,7 @@ def roots(normals):
 def block_cofactors(plan, normals, inverse):
     """Cofactors (nb, 3, 3) of all blocks, and (t, 3) of each block with its reduced columns.
 
-    inverse  (nr, nr) cofactor matrix of the reduced unknowns
+    inverse  (nr, nr) cofactor matrix of the reduced unknowns, row by row
     """
     cross, out = np.empty((len(plan.columns) + 1, 3)), np.empty((plan.blocks, 3, 3))
     cross[-1] = 0.0
@@ -132,12 +123,14 @@ def leverage(plan, batch, jac, inverse, cross, cofactors):
     if batch.block is not None and is_worth_compiling():
         out = np.empty(jac.shape[:2])
         compile_functions(loops, loops.COMPILED)._leverage(
-            jac, batch.block, batch.columns, batch.places, inverse, cross, cofactors, spare, out
-        )
+            jac, batch.block, batch.first, batch.place, batch.cuts,
+            inverse, cross, cofactors, spare, out,
+        )  # fmt: skip
         return out
     padded = np.pad(inverse, (0, 1))
     f = jac if batch.block is None else jac[:, :, 3:]
-    q = padded[batch.columns[:, :, None], batch.columns[:, None, :]]
+    columns = batch.columns
+    q = padded[columns[:, :, None], columns[:, None, :]]
     out = np.einsum("nma,nab,nmb->nm", f, q, f)
     if batch.block is not None:
         e, mixed = jac[:, :, :3], cross[batch.places]

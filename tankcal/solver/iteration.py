@@ -7,10 +7,11 @@ from tankcal.adjust import SMALLEST_PIVOT, Adjustment, find_determined
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver.cofactors import Cofactors, Factor
-from tankcal.solver.elimination import back_substitute, build, eliminate
+from tankcal.solver.elimination import back_substitute, eliminate
 from tankcal.solver.exact import Conditions
-from tankcal.solver.model import Normals, plan, s_transform
+from tankcal.solver.model import s_transform
 from tankcal.solver.rank import diagnosis, weakness
+from tankcal.solver.rows import Rows
 from tankcal.solver.threads import threads_for
 
 SMALL = 2e7  # rows times unknowns squared: below it a system without blocks is solved by QR
@@ -70,41 +71,41 @@ def linearise(model, state):
     """
     with threads_for(model.reduced):
         work = _Work(model)
-        cost, factor = work.evaluate(state), work.sound_factor(state)
+        cost, factor = work.rows.add(state), work.sound_factor(state)
         _refuse_untouched(model, factor)
         return work.adjustment(state, cost, 0, factor)
 
 
 def _solved(work, state, max_iterations, tolerance):
     """The iteration of `solve`."""
-    model, state = work.model, work.closed_start(state)
-    cost = work.evaluate(state)
+    model, rows, state = work.model, work.rows, work.closed_start(state)
+    cost = rows.add(state)
     damping, resting = 0.0, FIRST_DAMPING
-    limit = tolerance**2 * max(work.rows, 1)
+    limit = tolerance**2 * max(rows.count, 1)
     for iteration in range(1, max_iterations + 1):
-        factor = work.factor(state, damping)
-        if factor is None:
-            damping = _stronger(damping, resting)
-            continue
-        step, decrement = work.step(factor)
-        candidate = work.closed(model.moved(state, step), factor)
+        factor, candidate = work.factor(state, damping), None
+        if factor is not None:
+            step, decrement = work.step(factor)
+            candidate = work.closed(model.moved(state, step), factor)
         if candidate is None:
-            damping = _stronger(damping, resting)
+            cost, damping = rows.add(state), _stronger(damping, resting)
             continue
         if not damping and decrement < limit:
             _refuse_untouched(model, factor)
-            cost = work.evaluate(candidate, derivatives=False)
-            sharp = decrement < SHARP * max(work.rows, 1)
-            return work.adjustment(candidate, cost, iteration, factor if sharp else None)
-        before, cost = cost, work.evaluate(candidate)
-        if cost <= before * (1 + 1e-12):
+            if decrement < SHARP * max(rows.count, 1):
+                return work.adjustment(candidate, rows.evaluate(candidate), iteration, factor)
+            cost = rows.add(candidate)
+            return work.adjustment(candidate, cost, iteration, work.sound_factor(candidate))
+        before, most = cost, cost * (1 + 1e-12)
+        cost = rows.add(candidate, most)
+        if cost <= most:
             gain = 2 * (before - cost) / decrement
             damping *= max(1 / 3, 1 - (2 * gain - 1) ** 3)
             if damping and decrement < NEARLY_THERE * cost:
                 damping, resting = 0.0, damping
             state = candidate
         else:
-            cost, damping = work.evaluate(state), _stronger(damping, resting)
+            cost, damping = rows.add(state), _stronger(damping, resting)
     raise SolutionError(
         message(
             "not_converged",
@@ -133,27 +134,19 @@ def _stronger(damping, resting):
 
 
 class _Work:
-    """Plan and buffers of one solve."""
+    """Rows, plan and exact conditions of one solve."""
 
     def __init__(self, model):
-        self.model = model
-        self.plan = plan(model.reduced, model.blocks, model.groups)
-        self.w = [np.zeros((len(group.columns), group.rows)) for group in model.groups]
-        self.jac = [
-            np.zeros((len(group.columns), group.rows, group.columns.shape[1]))
-            for group in model.groups
-        ]
-        self.normals = Normals.zero(self.plan)
-        self.rows = sum(w.size for w in self.w)
+        self.model, self.rows = model, Rows(model)
+        self.plan, self.normals = self.rows.plan, self.rows.normals
         self.conditions = Conditions(model)
 
     def closed_start(self, state):
         """The start state, brought to where the exact conditions hold."""
         if not self.conditions:
             return state
-        self.evaluate(state)
         lengths = np.zeros(self.model.unknowns + 1)
-        for group, jac in zip(self.model.groups, self.jac, strict=True):
+        for group, jac in zip(self.model.groups, self.rows.derivatives(state), strict=True):
             np.add.at(lengths, group.columns, np.einsum("nmk,nmk->nk", jac, jac))
         lengths = lengths[: self.plan.reduced]
         scale = 1.0 / np.sqrt(np.where(lengths > 0, lengths, 1.0))
@@ -163,33 +156,21 @@ class _Work:
         """The state after a step, brought back to the exact conditions; None: damp more."""
         return self.conditions.closed(state, factor.scale) if self.conditions else state
 
-    def evaluate(self, state, derivatives=True):
-        """Fill misclosures (and derivatives) at a state; half the sum of squares."""
-        cost = 0.0
-        for group, w, jac in zip(self.model.groups, self.w, self.jac, strict=True):
-            group.fill(state, w, jac if derivatives else jac[:0])
-            cost += 0.5 * float(np.vdot(w, w))
-        return cost if np.isfinite(cost) else np.inf
-
     def adjustment(self, state, cost, iterations, factor):
-        """The Adjustment at a minimum; factor  that of its normal equations, None: not made yet."""
-        rows = int(sum(np.count_nonzero(jac.any(axis=2)) for jac in self.jac))
-        if factor is None:
-            self.evaluate(state)
-            factor = self.sound_factor(state)
+        """The Adjustment at a minimum; factor  that of its normal equations."""
         return Adjustment(
             unknowns=state,
-            cofactor=Cofactors(self, factor),
-            normalised=tuple(self.w),
+            cofactor=Cofactors(self, state, factor),
+            normalised=self.rows.misclosures,
             chi2=2.0 * cost,
-            rows=rows,
+            rows=self.rows.weighing,
             estimated=self.model.unknowns - (factor.tangent.rank if self.conditions else 0),
             iterations=iterations,
             rank_defect=0 if factor.null_space is None else factor.null_space.shape[1],
         )
 
     def sound_factor(self, state):
-        """The Factor at the evaluated state; a SolutionError when there is none."""
+        """The Factor of the rows just added; a SolutionError when there is none."""
         factor = self.factor(state, 0.0)
         if factor is None:
             raise SolutionError(
@@ -202,9 +183,8 @@ class _Work:
         return factor
 
     def factor(self, state, damping):
-        """Normal equations at the evaluated state, eliminated and factored; None: damp more."""
+        """Normal equations of the rows just added, eliminated, factored; None: damp more."""
         normals, nr = self.normals, self.plan.reduced
-        build(self.plan, normals, self.w, self.jac)
         diagonal = normals.t.diagonal()[:nr].copy()
         if not np.isfinite(diagonal).all():
             return None  # no derivative exists at this state
@@ -230,7 +210,7 @@ class _Work:
                     )
                 )
             held = np.linalg.qr(null_space[:nr] / scale[:, None])[0]
-        if self.plan.blocks == 0 and self.rows * nr * nr < SMALL:
+        if self.plan.blocks == 0 and self.rows.count * nr * nr < SMALL:
             lower, sound, reaction_part = self._dense_root(scale, untouched, damping, held, tangent)
         else:
             lower, sound, reaction_part = self._root(scale, untouched, damping, held, tangent)
@@ -260,7 +240,9 @@ class _Work:
         if tangent is not None:
             s, reaction_part = tangent.square(s)
         lower, info = scipy.linalg.lapack.dpotrf(s.T, lower=1, clean=0, overwrite_a=1)
-        sound = not info and find_determined(lower.diagonal(), self.rows, of_normals=True).all()
+        sound = (
+            not info and find_determined(lower.diagonal(), self.rows.count, of_normals=True).all()
+        )
         return lower, sound, reaction_part
 
     def _dense_root(self, scale, untouched, damping, held, tangent):
@@ -269,20 +251,21 @@ class _Work:
         rows = [np.diag(untouched.astype(float)), np.sqrt(damping) * np.eye(nr)]
         if held is not None:
             rows.append(held.T)
-        for batch in self.plan.batches:
-            jac = batch.of(self.jac[batch.group])
-            n, m, _ = jac.shape
-            dense = np.zeros((n, m, nr + 1))
-            columns = np.broadcast_to(batch.columns[:, None, :], jac.shape)
-            dense[np.arange(n)[:, None, None], np.arange(m)[:, None], columns] = jac
-            rows.append(dense.reshape(n * m, dense.shape[-1])[:, :nr] * scale)
+        for part in self.rows.parts:  # without blocks a group is one part
+            for batch in part.batches:
+                jac = batch.of(part.jac)
+                n, m, _ = jac.shape
+                dense = np.zeros((n, m, nr + 1))
+                columns = np.broadcast_to(batch.columns[:, None, :], jac.shape)
+                dense[np.arange(n)[:, None, None], np.arange(m)[:, None], columns] = jac
+                rows.append(dense.reshape(n * m, dense.shape[-1])[:, :nr] * scale)
         rows, reaction_part = np.vstack(rows), None
         if tangent is not None:
             outer, rows = tangent.split(rows.T)
             reaction_part, rows = outer @ np.vstack([outer, rows]).T, rows.T
         r = np.linalg.qr(rows, mode="r")
         lower = np.asfortranarray((r * np.sign(r.diagonal())[:, None]).T)
-        return lower, find_determined(lower.diagonal(), self.rows).all(), reaction_part
+        return lower, find_determined(lower.diagonal(), self.rows.count).all(), reaction_part
 
     def _look(self, state, damping, bad_block):
         """A factor that could not be had: raise when it is the survey's fault."""

@@ -7,19 +7,21 @@ For the rows of a batch with derivatives E by their block and F by reduced unkno
 and for each block, V = L L', the wide part becomes Y = wide L^-T and b becomes y = L^-1 b, so that
 the reduced equations are S - Y Y' and g - Y y. S is kept as a matrix T in which each pair of
 unknowns stands once: S = T + T' - diag T.
+
+In the innermost loops places are counted without a sign (np.uintp): numba tests at each number
+whether one that might be negative is counted from the end.
 """
 
 import numpy as np
 
 TOGETHER = 32  # blocks with the same columns that are eliminated at once
-BY_HAND = 500  # elements; above it a product is worth a call of BLAS
 COMPILED = (
-    "_add_rows",
-    "_add_plain_rows",
+    "_is_alike",
+    "_add_squares",
+    "_add_blocks",
     "_root",
     "_forward",
     "_forward_all",
-    "_subtract",
     "_leave",
     "_eliminate",
     "_back",
@@ -28,57 +30,66 @@ COMPILED = (
 )
 
 
-def _add_plain_rows(w, jac, columns, t, g):
-    n, m, k = jac.shape
-    for i in range(n):
-        c = columns[i]
-        for row in range(m):
-            f, r = jac[i, row], w[i, row]
-            for a in range(k):
-                g[c[a]] += f[a] * r
-                for b in range(a, k):
-                    t[c[a], c[b]] += f[a] * f[b]
+def _add_squares(w, jac, skip, first, cuts, t, g):
+    """S += F'F, g += F'w; F are the derivatives from number `skip` on, in runs of columns.
+
+    Neighbouring rows with the same columns enter by one product.
+    """
+    n, m, width = jac.shape
+    runs = len(cuts) - 1
+    flat, errors = jac.reshape((n * m, width)), w.reshape(n * m)
+    square, product = np.empty((width, width)), np.empty(width)
+    end = 0
+    while end < n:
+        begin, end = end, end + 1
+        while end < n and _is_alike(first, end, begin):
+            end += 1
+        f = flat[m * begin : m * end]
+        np.dot(f.T, f, square)
+        np.dot(f.T, errors[m * begin : m * end], product)
+        for one in range(runs):
+            to = first[begin, one] - cuts[one]
+            for a in range(cuts[one], cuts[one + 1]):
+                g[to + a] += product[skip + a]
+                for other in range(one, runs):
+                    by = first[begin, other] - cuts[other]
+                    for q in range(max(a, cuts[other]), cuts[other + 1]):
+                        t[to + a, by + q] += square[skip + a, skip + q]
 
 
-def _add_rows(w, jac, block, columns, places, cuts, v, wide, b, t, g):
-    n, m, k = jac.shape
+def _is_alike(first, i, j):
+    alike = True
+    for run in range(first.shape[1]):
+        alike = alike and first[i, run] == first[j, run]
+    return alike
+
+
+def _add_blocks(w, jac, block, place, cuts, v, wide, b):
+    """V += E'E, wide += F'E, b += E'w; E are the first three derivatives, F those after them."""
+    n, m, _ = jac.shape
     for i in range(n):
-        c, p, o = columns[i], places[i], block[i]
-        for row in range(m):
-            e, f, r = jac[i, row, :3], jac[i, row, 3:], w[i, row]
-            e0, e1, e2 = e[0], e[1], e[2]
-            b[o, 0] += e0 * r
-            b[o, 1] += e1 * r
-            b[o, 2] += e2 * r
-            v[o, 0] += e0 * e0
-            v[o, 1] += e1 * e0
-            v[o, 2] += e1 * e1
-            v[o, 3] += e2 * e0
-            v[o, 4] += e2 * e1
-            v[o, 5] += e2 * e2
-            for a in range(k - 3):
-                fa = f[a]
-                wide[p[a], 0] += fa * e0
-                wide[p[a], 1] += fa * e1
-                wide[p[a], 2] += fa * e2
-                g[c[a]] += fa * r
-        if m == 2:  # image coordinates: most of the work
-            f, h = jac[i, 0, 3:], jac[i, 1, 3:]
+        o = block[i]
+        for row in range(0, m, 2):  # two at a time: image coordinates, most of the work
+            x = min(row + 1, m - 1)
+            both = 1.0 if x > row else 0.0
+            e0, e1, e2, r = jac[i, row, 0], jac[i, row, 1], jac[i, row, 2], w[i, row]
+            d0, d1, d2, s = both * jac[i, x, 0], both * jac[i, x, 1], both * jac[i, x, 2], w[i, x]
+            b[o, 0] += e0 * r + d0 * s
+            b[o, 1] += e1 * r + d1 * s
+            b[o, 2] += e2 * r + d2 * s
+            v[o, 0] += e0 * e0 + d0 * d0
+            v[o, 1] += e1 * e0 + d1 * d0
+            v[o, 2] += e1 * e1 + d1 * d1
+            v[o, 3] += e2 * e0 + d2 * d0
+            v[o, 4] += e2 * e1 + d2 * d1
+            v[o, 5] += e2 * e2 + d2 * d2
             for one in range(len(cuts) - 1):
+                to = place[i, one] - cuts[one]
                 for a in range(cuts[one], cuts[one + 1]):
-                    fa, ha = f[a], h[a]
-                    for other in range(one, len(cuts) - 1):
-                        begin, end = max(a, cuts[other]), cuts[other + 1]
-                        line = t[c[a], c[begin] : c[begin] + end - begin]
-                        f1, h1 = f[begin:end], h[begin:end]
-                        for q in range(end - begin):
-                            line[q] += fa * f1[q] + ha * h1[q]
-        else:
-            for row in range(m):
-                f = jac[i, row, 3:]
-                for a in range(k - 3):
-                    for q in range(a, k - 3):
-                        t[c[a], c[q]] += f[a] * f[q]
+                    f, h = jac[i, row, 3 + a], jac[i, x, 3 + a]
+                    wide[to + a, 0] += f * e0 + h * d0
+                    wide[to + a, 1] += f * e1 + h * d1
+                    wide[to + a, 2] += f * e2 + h * d2
 
 
 def _root(v, damping, smallest):
@@ -118,38 +129,20 @@ def _forward_all(v, part, b, y, g, columns):
         g[columns[a]] -= w0 * b0 + w1 * b1 + w2 * b2
 
 
-def _subtract(t, columns, runs, first, product):
-    """Take a product (n, n), its upper half, from the places of its columns in t."""
-    for one in range(len(runs) - 1):
-        for a in range(runs[one] - first, runs[one + 1] - first):
-            for other in range(one, len(runs) - 1):
-                begin, end = max(a, runs[other] - first), runs[other + 1] - first
-                to = columns[begin]
-                line, part = t[columns[a], to : to + end - begin], product[a, begin:end]
-                for q in range(end - begin):
-                    line[q] -= part[q]
-
-
 def _leave(t, columns, runs, first, y, product):
     """Take Y'Y, its upper half, from the places of its columns in t; y (3 blocks, n)."""
-    n = len(columns)
-    if y.size > BY_HAND:
-        np.dot(y.T, y, product)
-        _subtract(t, columns, runs, first, product)
-    elif len(y) == 3:
-        for a in range(n):
-            w0, w1, w2, line = -y[0, a], -y[1, a], -y[2, a], t[columns[a]]
-            for q in range(a, n):
-                line[columns[q]] += w0 * y[0, q] + w1 * y[1, q] + w2 * y[2, q]
-    else:
-        product[:] = 0.0
-        for row in range(0, len(y), 3):
-            y0, y1, y2 = y[row], y[row + 1], y[row + 2]
-            for a in range(n):
-                w0, w1, w2, line = y0[a], y1[a], y2[a], product[a]
-                for q in range(a, n):
-                    line[q] += w0 * y0[q] + w1 * y1[q] + w2 * y2[q]
-        _subtract(t, columns, runs, first, product)
+    np.dot(y.T, y, product)
+    n, width = len(columns), t.shape[1]
+    flat, part = t.reshape(t.size), product.reshape(product.size)
+    for one in range(len(runs) - 1):
+        edge = runs[one] - first
+        for a in range(runs[one + 1] - runs[one]):
+            for other in range(one, len(runs) - 1):
+                begin = max(edge + a, runs[other] - first)
+                to = np.uintp((columns[edge] + a) * width + columns[begin])
+                of = np.uintp((edge + a) * n + begin)
+                for q in range(np.uintp(runs[other + 1] - first - begin)):
+                    flat[to + q] -= part[of + q]
 
 
 def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, smallest):
@@ -181,13 +174,15 @@ def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, sm
 
 
 def _back(v, wide, b, starts, columns, reduced, out):
+    flat, one, two, three = wide.reshape(wide.size), np.uintp(1), np.uintp(2), np.uintp(3)
     for o in range(len(b)):
         x0, x1, x2 = b[o, 0], b[o, 1], b[o, 2]
-        for a in range(starts[o], starts[o + 1]):
-            line, r = wide[a], reduced[columns[a]]
-            x0 += line[0] * r
-            x1 += line[1] * r
-            x2 += line[2] * r
+        first = np.uintp(starts[o])
+        for a in range(np.uintp(starts[o + 1] - starts[o])):
+            r, at = reduced[np.uintp(columns[first + a])], three * (first + a)
+            x0 += flat[at] * r
+            x1 += flat[at + one] * r
+            x2 += flat[at + two] * r
         x2 = x2 / v[o, 5]
         x1 = (x1 - v[o, 4] * x2) / v[o, 2]
         x0 = (x0 - v[o, 1] * x1 - v[o, 3] * x2) / v[o, 0]
@@ -240,24 +235,30 @@ def _cofactors(v, wide, starts, columns, runs, ends, inverse, cross, out):
         out[o, 0, 1], out[o, 0, 2], out[o, 1, 2] = out[o, 1, 0], out[o, 2, 0], out[o, 2, 1]
 
 
-def _leverage(jac, block, columns, places, inverse, cross, cofactors, spare, out):
-    n, m, k = jac.shape
+def _leverage(jac, block, first, place, cuts, inverse, cross, cofactors, spare, out):
+    n, m, _ = jac.shape
+    runs = len(cuts) - 1
     for i in range(n):
-        o, c, p = block[i], columns[i], places[i]
+        q = cofactors[block[i]]
         for row in range(m):
-            e, f = jac[i, row, :3], jac[i, row, 3:]
-            q = cofactors[o]
+            e0, e1, e2 = jac[i, row, 0], jac[i, row, 1], jac[i, row, 2]
             total = (
-                e[0] * e[0] * q[0, 0] + e[1] * e[1] * q[1, 1] + e[2] * e[2] * q[2, 2]
-                + 2.0 * (e[0] * e[1] * q[0, 1] + e[0] * e[2] * q[0, 2] + e[1] * e[2] * q[1, 2])
+                e0 * e0 * q[0, 0] + e1 * e1 * q[1, 1] + e2 * e2 * q[2, 2]
+                + 2.0 * (e0 * e1 * q[0, 1] + e0 * e2 * q[0, 2] + e1 * e2 * q[1, 2])
             )  # fmt: skip
-            for a in range(k - 3):
-                if c[a] == spare:
+            for one in range(runs):
+                if first[i, one] == spare:
                     continue
-                line, x = cross[p[a]], inverse[c[a]]
-                half = 0.5 * f[a] * x[c[a]] + e[0] * line[0] + e[1] * line[1] + e[2] * line[2]
-                for b in range(a + 1, k - 3):
-                    if c[b] != spare:
-                        half += f[b] * x[c[b]]
-                total += 2.0 * f[a] * half
+                for a in range(cuts[one], cuts[one + 1]):
+                    f, step = jac[i, row, 3 + a], a - cuts[one]
+                    line, x = cross[place[i, one] + step], inverse[first[i, one] + step]
+                    half = 0.5 * f * x[first[i, one] + step]
+                    half += e0 * line[0] + e1 * line[1] + e2 * line[2]
+                    for other in range(one, runs):
+                        if first[i, other] == spare:
+                            continue
+                        by = first[i, other] - cuts[other]
+                        for c in range(max(a + 1, cuts[other]), cuts[other + 1]):
+                            half += jac[i, row, 3 + c] * x[by + c]
+                    total += 2.0 * f * half
             out[i, row] = total

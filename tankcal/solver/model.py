@@ -25,11 +25,14 @@ class Group:
     fill : callable
         fill(state, w, jac) writes misclosures (computed minus observed, over the sd) into w (n, m)
         and derivatives into jac (n, m, K); a jac of length 0 is left out.
+    part : callable
+        part(slice) -> what fills these observations alone; None: they are always filled together.
     """
 
     columns: np.ndarray
     rows: int
     fill: Callable
+    part: Callable = None
 
 
 @dataclass(frozen=True)
@@ -126,22 +129,39 @@ class Normals:
 class Batch:
     """Rows of one group that are treated alike.
 
-    group    number of the group
-    rows     which observations of the group: a slice, or (n,)
-    order    (n, K) place in the group's derivatives of each of this batch's, or None (as they are)
-    block    (n,) block whose derivatives come first, or None
-    columns  (n, k) reduced column of each further derivative; a fixed unknown has the spare column
-    cuts     where runs of neighbouring columns, common to all these rows, begin; and k at the end
-    places   (n, k) where column and block meet in the wide part; a spare place for the fixed ones
+    The reduced columns of a row come in runs of neighbours, cut alike in all rows.
+
+    group  number of the group
+    rows   which observations of the group: a slice, or (n,)
+    order  (n, K) place in the group's derivatives of each of this batch's, or None (as they are)
+    block  (n,) block whose derivatives come first, or None
+    cuts   (s + 1,) where the runs begin among the k further derivatives; and k at the end
+    first  (n, s) column of the first of each run; a fixed unknown is a run, in the spare column
+    place  (n, s) where that column and the block meet in the wide part; a spare place for the fixed
     """
 
     group: int
     rows: object
     order: object
     block: object
-    columns: np.ndarray
     cuts: np.ndarray
-    places: object
+    first: np.ndarray
+    place: object
+
+    @property
+    def columns(self):
+        """(n, k) reduced column of each further derivative."""
+        return self._spread(self.first)
+
+    @property
+    def places(self):
+        """(n, k) where each column and the block meet in the wide part."""
+        return self._spread(self.place)
+
+    def _spread(self, first):
+        lengths = np.diff(self.cuts)
+        within = np.arange(self.cuts[-1]) - np.repeat(self.cuts[:-1], lengths)
+        return np.repeat(first, lengths, axis=1) + within
 
     def of(self, array):
         """This batch's part of an array (n, m) of misclosures or (n, m, K) of derivatives."""
@@ -176,62 +196,82 @@ class Plan:
 
 def plan(reduced, blocks, groups):
     """The Plan of groups of observations (see tankcal.solver.Group)."""
-    raw = [
-        part for g, group in enumerate(groups) for part in _split(g, group.columns, reduced, blocks)
-    ]
+    raw = []
+    for g, group in enumerate(groups):
+        for rows, order, block, columns in _split(group.columns, reduced, blocks):
+            cuts = _cuts(columns, reduced)
+            first = np.ascontiguousarray(columns[:, cuts[:-1]], dtype=np.int32)
+            raw.append((g, rows, order, block, cuts, first))
     together = np.zeros((blocks, reduced + 1), dtype=bool)
-    for _, _, _, block, columns in raw:
+    for _, _, _, block, cuts, first in raw:
         if block is not None:
-            together[block[:, None], columns] = True
+            _mark(together, block, cuts, first)
     together[:, reduced] = False
-    owner, columns = np.nonzero(together)
-    place = np.full((blocks, reduced + 1), len(columns), dtype=np.int32)
-    place[owner, columns] = np.arange(len(columns), dtype=np.int32)
-    starts = np.zeros(blocks + 1, dtype=np.int64)
-    np.cumsum(np.bincount(owner, minlength=blocks), out=starts[1:])
+    met = np.flatnonzero(together)
+    starts = np.searchsorted(met, np.arange(blocks + 1) * (reduced + 1))
+    owner = np.repeat(np.arange(blocks, dtype=np.int32), np.diff(starts))
+    columns = (met - owner * np.int64(reduced + 1)).astype(np.int32)
+    place = np.full((blocks, reduced + 1), len(met), dtype=np.int32)
+    place.ravel()[met] = np.arange(len(met), dtype=np.int32)
     batches = tuple(
-        Batch(
-            g, rows, order, block, cols, _cuts(cols, reduced),
-            None if block is None else place[block[:, None], cols],
-        )
-        for g, rows, order, block, cols in raw
-    )  # fmt: skip
-    begins = np.ones(len(columns), dtype=bool)
-    begins[1:] = (np.diff(columns) != 1) | (np.diff(owner) != 0)
-    ends = np.append(np.flatnonzero(begins), len(columns))
+        Batch(*fields, None if fields[3] is None else place[fields[3][:, None], fields[-1]])
+        for fields in raw
+    )
+    ends = np.flatnonzero(np.diff(met, prepend=-2, append=-2) != 1)
     changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
     alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
     runs = np.searchsorted(ends, starts)
     return Plan(reduced, blocks, batches, starts, columns, ends, runs, alike)
 
 
+def _mark(together, block, cuts, first):
+    """Mark (blocks, columns) where rows with a block have columns: first (n, s) of runs."""
+    for run, length in enumerate(np.diff(cuts)):
+        mine = np.zeros_like(together)
+        mine[block, first[:, run]] = True
+        reach = 1
+        while reach < length:  # each mark spreads to as many neighbours as the run has
+            more = min(reach, length - reach)
+            mine[:, more:] |= mine[:, :-more]
+            reach += more
+        together |= mine
+
+
+AT_ONCE = 50_000  # rows whose columns are compared at a time
+
+
 def _cuts(columns, spare):
     """Where runs begin: places at which some row's column is not the one after its neighbour."""
-    k = columns.shape[1]
-    if k == 0 or len(columns) == 0:
+    n, k = columns.shape
+    if k == 0 or n == 0:
         return np.arange(k + 1)
-    follows = (columns[:, 1:] == columns[:, :-1] + 1) & (columns[:, 1:] != spare)
-    return np.append(np.flatnonzero(np.append(True, ~follows.all(axis=0))), k)
+    follows = np.ones(k - 1, dtype=bool)
+    for start in range(0, n, AT_ONCE):
+        part = columns[start : start + AT_ONCE]
+        follows &= ((np.diff(part, axis=1) == 1) & (part[:, 1:] != spare)).all(axis=0)
+    return np.append(np.flatnonzero(np.append(True, ~follows)), k)
 
 
-def _split(number, columns, reduced, blocks):
+def _split(columns, reduced, blocks):
     """The rows of a group with a block and those without, the block's derivatives first."""
-    spare = np.where(columns < 0, reduced, columns)
+    spare = columns
+    if (columns < 0).any():
+        spare = np.where(columns < 0, reduced, columns)
     if blocks == 0 or columns.size == 0:
-        return [(number, slice(None), None, None, spare)]
+        return [(slice(None), None, None, spare)]
     eliminated = columns >= reduced
     if eliminated.shape[1] >= 3 and not eliminated[:, 3:].any():
         with_block = np.count_nonzero(eliminated[:, 0])
         if eliminated[:with_block, :3].all():  # rows with a block come first, block first
             first, rest = slice(0, with_block), slice(with_block, None)
-            parts = [(number, rest, None, None, spare[rest])] if with_block < len(spare) else []
+            parts = [(rest, None, None, spare[rest])] if with_block < len(spare) else []
             if with_block:
                 block = (columns[first, 0] - reduced) // 3
-                parts.append((number, first, None, block, spare[first, 3:]))
+                parts.append((first, None, block, spare[first, 3:]))
             return parts
     order = np.argsort(~eliminated, axis=1, kind="stable")
     has = eliminated.any(axis=1)
-    parts = [(number, np.flatnonzero(~has), None, None, spare[~has])] if not has.all() else []
+    parts = [(np.flatnonzero(~has), None, None, spare[~has])] if not has.all() else []
     if not has.any():
         return parts
     order = order[has]
@@ -239,4 +279,4 @@ def _split(number, columns, reduced, blocks):
     block = (moved[:, 0] - reduced) // 3
     if (eliminated.sum(axis=1)[has] != 3).any() or (np.diff(moved[:, :3], axis=1) != 1).any():
         raise ValueError("a row touches two eliminated blocks, or a part of one")
-    return [*parts, (number, np.flatnonzero(has), order, block, moved[:, 3:])]
+    return [*parts, (np.flatnonzero(has), order, block, moved[:, 3:])]

@@ -8,7 +8,7 @@ different units or nearly equal parameters stays far above it.
 import numpy as np
 
 from tankcal.messages import message
-from tankcal.solver.elimination import back_substitute, build, eliminate
+from tankcal.solver.elimination import back_substitute, eliminate
 
 NOTHING = 1e-7
 FAINT = 1e-9  # eigenvalue of the scaled reduced system that makes a direction a candidate
@@ -69,7 +69,7 @@ def null_space(work, state, faint=FAINT, nothing=NOTHING):
     faint  eigenvalue, see FAINT      nothing  see NOTHING
     """
     normals, nr = work.normals, work.plan.reduced
-    build(work.plan, normals, work.w, work.jac)
+    work.rows.add(state)
     diagonal = normals.t.diagonal()[:nr].copy(), normals.v[:, [0, 2, 5]].ravel()
     lengths = np.sqrt(np.concatenate(diagonal))
     scale = 1.0 / np.where(lengths > 0, lengths, 1.0)
@@ -82,12 +82,12 @@ def null_space(work, state, faint=FAINT, nothing=NOTHING):
     if tangent is not None:
         vectors = tangent.from_null_space(vectors)
     normals.b[:] = 0.0
-    found = []
+    found, derivatives = [], work.rows.derivatives(state)
     for vector in vectors[:, values < faint].T:
         reduced = vector * scale[:nr]
         direction = np.concatenate([reduced, -back_substitute(work.plan, normals, reduced).ravel()])
         length = np.linalg.norm(direction / scale)
-        if _felt(work, direction) < nothing * length:
+        if _felt(work.model, derivatives, direction) < nothing * length:
             found.append(direction / scale / length)
     found = np.array(found).T if found else np.zeros((work.model.unknowns, 0))
     return found, lengths
@@ -102,11 +102,11 @@ def _without(directions, null_space):
     return vectors[:, sizes > 0.1]
 
 
-def _felt(work, direction):
+def _felt(model, derivatives, direction):
     """Root of the sum of squares of what a direction (unknowns,) changes in the rows."""
     direction = np.append(direction, 0.0)
     total = 0.0
-    for group, jac in zip(work.model.groups, work.jac, strict=True):
+    for group, jac in zip(model.groups, derivatives, strict=True):
         change = np.einsum("nmk,nk->nm", jac, direction[group.columns])
         total += float(np.vdot(change, change))
     return np.sqrt(total)

@@ -109,5 +109,4 @@ def free_port(address, wanted=None):
 def _let_kernels_start_quickly():
     """As the command line does: a second BLAS thread costs time with small matrices."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    os.environ.setdefault("TANKCAL_COMPILED", "patient")
     os.environ.setdefault("PYDEVD_DISABLE_FILE_VALIDATION", "1")

@@ -11,6 +11,8 @@ from networks import INTERIOR, SCOPE, by_total_station, photographed
 import tankcal.camera.imaging
 import tankcal.solver.compiled
 import tankcal.solver.elimination
+import tankcal.solver.rows
+import tankcal.survey.network.assembly
 from tankcal.adjust import noncentrality
 from tankcal.camera.model import CONVENTIONS, Form
 from tankcal.errors import SolutionError
@@ -127,11 +129,30 @@ def test_loops_and_arrays_agree(make, compiler, monkeypatch):
         assert other.w == pytest.approx(one.w, abs=1e-5)
 
 
+def test_rows_in_parts_give_what_all_of_them_give(survey, adjusted, monkeypatch):
+    """Second method: the derivatives of a group at once; here a dozen image points at a time."""
+    for room in (tankcal.solver.rows, tankcal.survey.network.assembly):
+        monkeypatch.setattr(room, "PART", 12)
+    found = adjust(survey)
+    parts = [part.jac for part in found.solution.cofactor.rows.parts if len(part.w) == 12]
+    assert len(parts) > 5
+    assert np.shares_memory(parts[0], parts[-1])
+    assert found.solution.chi2 == pytest.approx(adjusted.solution.chi2, rel=1e-12)
+    assert found.solution.rows == adjusted.solution.rows
+    assert found.xyz_m == pytest.approx(adjusted.xyz_m, abs=1e-10)
+    assert found.point_covariances_m2 == pytest.approx(adjusted.point_covariances_m2, rel=1e-9)
+    leverage = found.solution.cofactor.redundancy()[-1]
+    rows_of, before = (one.problem.rows_of[-1] for one in (found, adjusted))
+    expected = adjusted.solution.cofactor.redundancy()[-1][np.argsort(before)]
+    assert leverage[np.argsort(rows_of)] == pytest.approx(expected, abs=1e-9)
+
+
 def test_small_jobs_do_not_wait_for_a_compiler(monkeypatch):
     """Arrays until there is enough work; what is large from the start is compiled at once."""
     room = tankcal.solver.compiled
     monkeypatch.setattr(room, "available", lambda: True)
     monkeypatch.setattr(room, "_asked_for", lambda: "patient")
+    monkeypatch.setattr(room, "are_kept", lambda: False)
     monkeypatch.setattr(room, "_worked", 0)
     assert not any(room.is_worth_compiling(1500) for _ in range(100))
     assert not room.is_worth_compiling()

@@ -7,6 +7,7 @@ import numpy as np
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver import Group, Model
+from tankcal.solver.rows import PART
 from tankcal.survey.network.blocks import CORRELATED, correlated_groups, is_in_block
 from tankcal.survey.network.survey import FEWEST, IMAGES, SCOPES
 from tankcal.survey.network.unknowns import (
@@ -155,7 +156,10 @@ def _refuse_coincident(survey, groups, state):
 
 
 def _groups(observations, layout):
-    return tuple(Group(one.columns(layout), one.rows, one.fill) for one in observations)
+    return tuple(
+        Group(one.columns(layout).astype(np.int32), one.rows, one.fill, one.part)
+        for one in observations
+    )
 
 
 def _set_aside(survey):
@@ -299,7 +303,11 @@ def _known_nuisances(survey):
 
 
 def _image_groups(survey, used, layout, reduced, table):
-    """Image coordinates by form of camera, those of eliminated points first and point by point."""
+    """Image coordinates by form of camera, those of eliminated points first and point by point.
+
+    Of so many as are evaluated together those of a photo stand next to one another: their rows
+    have the same columns, and squares of all of them are one product.
+    """
     images = survey.image_points
     if images is None or not len(images):
         return
@@ -310,14 +318,20 @@ def _image_groups(survey, used, layout, reduced, table):
                 "an image coordinate cannot hold exactly: its sd must be above zero",
             )
         )
-    key = layout.points[images.point, 0]
-    key = np.where(key < reduced, np.iinfo(np.int64).max, key)
+    key, last = layout.points[images.point, 0], np.iinfo(np.int64).max
+    key = np.where(key < reduced, last, key)
     for form, order in survey.by_form(images):
         left = table[[survey.cameras[camera].form == form for camera in survey.photos.camera]]
         if not used.all():
             order = order[used[images.point[order]]]
         if (np.diff(key[order]) < 0).any():
             order = order[np.argsort(key[order], kind="stable")]
+        eliminated = np.count_nonzero(key[order] < last)
+        part = np.minimum(np.arange(len(order)), eliminated) // PART
+        part[eliminated:] += 1
+        of_photo = part * len(survey.photos.names) + images.photo[order]
+        small = np.min_scalar_type(of_photo.max(initial=0))  # sorted faster
+        order = order[np.argsort(of_photo.astype(small), kind="stable")]
         active = np.flatnonzero((left < layout.interior.size - 1).any(axis=0))
         active = active[(layout.interior[left[:, active]] >= 0).any(axis=0)]
         one = replace(images.taken(order), form=form, active=active, interior_of=table)

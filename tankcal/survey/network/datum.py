@@ -285,8 +285,10 @@ def add_inner_constraints(problem, over, combinations, photo=None):
     d = combinations.shape[1]
 
     def moves(state):
-        # what turns about held coordinates turns about where they are now, not at the start
-        ways = null_space(problem, state=state, count=d) if state is not problem.state else None
-        return directions(layout, state) @ (combinations if ways is None else ways)
+        ways = combinations
+        if d < 7 and state is not problem.state:
+            # what turns about held coordinates turns about where they are now, not at the start
+            ways = null_space(problem, state=state, count=d)
+        return directions(layout, state) @ ways
 
     return replace(problem, model=replace(problem.model, null_space=moves, inner=mask[:-1]))

@@ -220,6 +220,10 @@ class Observations:
         """Computed minus observed (n, m)."""
         return computed - np.reshape(self.value, computed.shape)
 
+    def part(self, rows):
+        """What fills some of the rows alone, a slice of them, see `fill`."""
+        return replace(self, trace=None).taken(rows).fill
+
     def fill(self, state, w, jac):
         """Whitened misclosures into w (n, m), derivatives into jac (n, m, K) unless it is empty."""
         wanted = len(jac) > 0
