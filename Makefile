@@ -58,7 +58,7 @@ schemas: $(VENV)/full ## write the JSON schemas of what is saved and docs/saved-
 	PYTHONPATH=.:tests $(BIN)/python tests/schemas.py
 
 bench: export ROUNDS ?= 5
-bench: $(VENV)/full ## time and memory of the main job, walls, tables of 1 mm rows and their u, ten million points, files of scanners, plans
+bench: $(VENV)/full ## time and memory of the main job, walls, tables of 1 mm rows and their u, ten million points, files of scanners, plans, growth
 	$(BIN)/python benchmarks/main_job.py
 	$(BIN)/python benchmarks/strapping.py
 	$(BIN)/python benchmarks/table.py
@@ -69,6 +69,7 @@ bench: $(VENV)/full ## time and memory of the main job, walls, tables of 1 mm ro
 	$(BIN)/python benchmarks/cloud_cells.py
 	$(BIN)/python benchmarks/cloud_peers.py
 	$(BIN)/python benchmarks/planning.py $(ROUNDS)
+	$(BIN)/python benchmarks/growth.py
 
 peer: $(VENV)/full ## the adjustment against C++ Ceres (needs libceres-dev)
 	$(MAKE) -C benchmarks/adjustment

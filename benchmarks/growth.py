@@ -2,14 +2,15 @@
 
     python benchmarks/growth.py [CASE ...]
 
-Each size runs in a process of its own with one BLAS thread; the seconds are those of the processor,
-the least of $ROUNDS rounds (5) in which all sizes take turns, without imports and what is made
-before (compiled loops, a file); the megabytes are the largest that the process held, the interpreter
-with numpy, scipy and pandas among them (110 to 170). Above $ROUNDS = 2 the large sizes run too.
+Each size runs in a process of its own with one BLAS thread. The seconds are those of the processor,
+the least of $ROUNDS rounds (5) in which all sizes take turns, without imports, what is made before
+and compiled loops; the megabytes are the most that the process held, the interpreter with numpy,
+scipy and pandas among them (100 to 300). Below three rounds the large sizes are left out, else they
+run twice.
 
 The slope is that of log time over log size between a size and the one before: 1 is twice the time
-for twice the size. The goal: none above 1.2 but those of what is dense by its nature (`DENSE`),
-marked with a star; docs/limits.md says why each of them must be.
+for twice the size. The goal: none above 1.2 but of what is dense by its nature (`DENSE`), marked
+with a star; docs/limits.md says why that must be.
 """
 
 import contextlib
@@ -21,11 +22,9 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import replace
 from pathlib import Path
 
-for _library in ("OPENBLAS", "NUMBA"):
-    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
@@ -47,6 +46,14 @@ bottom_z_m = 0.0
 step_m = {{step_m}}
 reference_temperature_c = 15
 liquid_density_kg_m3 = 850
+"""
+INSTRUMENT = """[instruments.T]
+kind = "total_station"
+certificate = "1"
+u_offset_mm = 1
+u_scale_ppm = 5
+s_mm = 2
+s_arcsec = 3
 """
 POINTS_PER_PHOTO = 100
 
@@ -114,11 +121,11 @@ def command(*arguments):
 
 def table_of_rows(folder, size):
     """Volumes, u, degrees of freedom, k and U of a table, fifty times."""
-    job, wall, body, levels = computed(folder, size)
+    from tankcal.tank.capacity import Capacity
+
+    *_, body, levels = computed(folder, size)
 
     def task():
-        from tankcal.tank.capacity import Capacity
-
         for _ in range(50):
             Capacity(levels, *body.rows(levels), 0.95).U_m3.sum()
 
@@ -204,6 +211,7 @@ def run_of_hits(folder, size):
 def cloud(folder, size):
     """The wall out of a file of so many points of a scanner."""
     import clouds
+
     from tankcal.clouds.wall import find_cloud_wall
     from tankcal.pipeline.cloud_cluster import open_passes
     from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
@@ -221,20 +229,22 @@ def cloud(folder, size):
     return task
 
 
-SMALL, LARGE = "small", "large"
 ROWS = (1000, 5000), (25_000,)
-CASES = {  # what: task, its unit, sizes that always run, sizes of a whole run
+POINTS = (1000, 4000), (12_500, 50_000)
+PHOTOS = (10, 40), (100, 200)
+CASES = {  # what: task, what its sizes count, sizes that always run, large ones
     "table, 50 times": (table_of_rows, "rows", *ROWS),
     "Monte Carlo": (monte_carlo_of_rows, "rows", *ROWS),
     "run of rows": (lambda *a: run_of_rows(*a, "--no-papers"), "rows", *ROWS),
     "run of rows, papers": (run_of_rows, "rows", (), (1000, 5000, 25_000)),
-    "wall and volumes": (wall_of_points, "points", (1000, 4000), (12_500, 50_000, 200_000)),
-    "run of points": (run_of_points, "points", (1000, 4000), (12_500, 50_000, 200_000)),
-    "adjustment": (adjustment_of_photos, "photos", (10, 40), (100, 200)),
-    "run of photos": (run_of_photos, "photos", (10, 40), (100, 200)),
-    "run of hits": (run_of_hits, "hits", (250, 500), (1000, 2500)),
+    "wall and volumes": (wall_of_points, "points", *POINTS),
+    "run of points": (run_of_points, "points", *POINTS),
     "wall of a cloud": (cloud, "points", (50_000,), (500_000, 5_000_000)),
+    "adjustment": (adjustment_of_photos, "photos", *PHOTOS),
+    "run of photos": (run_of_photos, "photos", *PHOTOS),
+    "run of hits": (run_of_hits, "hits", (250, 500), (1000, 2500)),
 }
+DENSE = ("adjustment", "run of photos", "run of hits")
 
 
 def main(chosen):
@@ -242,40 +252,38 @@ def main(chosen):
     print(f"{'what':<20}{'size':>10} {'of':<8}{'cpu s':>10}{'peak MB':>10}{'slope':>8}")
     for name in chosen:
         _, unit, small, large = CASES[name]
-        sizes = small + (large if ROUNDS > 2 else ())
-        found = {size: [] for size in sizes}
-        for _ in range(ROUNDS):
-            for size in sizes:
-                found[size].append(measured(name, size))
+        found = {size: [] for size in small + (large if ROUNDS > 2 else ())}
+        for number in range(ROUNDS):
+            for size, runs in found.items():
+                if size in small or number < 2:
+                    runs.append(measured(name, size))
         before = None
         for size, runs in found.items():
             seconds, megabytes = (min(one) for one in zip(*runs, strict=True))
             slope = ""
             if before:
                 slope = f"{math.log(seconds / before[1]) / math.log(size / before[0]):.2f}"
-            print(
-                f"{name:<20}{size:>10} {unit:<8}{seconds:>10.3f}{megabytes:>10.0f}{slope:>8}",
-                flush=True,
-            )
+            slope += "*" * (name in DENSE)
+            row = f"{name:<20}{size:>10} {unit:<8}{seconds:>10.3f}{megabytes:>10.0f}{slope:>8}"
+            print(row, flush=True)
             before = size, seconds
 
 
 def measured(name, size):
     """Seconds and megabytes of one size in a process of its own."""
     own = [sys.executable, __file__, "--one", name, str(size)]
-    return [
-        float(one)
-        for one in subprocess.run(own, check=True, capture_output=True, text=True).stdout.split()
-    ]
+    out = subprocess.run(own, check=True, stdout=subprocess.PIPE, text=True).stdout
+    return [float(one) for one in out.split()]
 
 
 def once(name, size):
-    """Print the processor's seconds and the largest megabytes of one task."""
+    """Print the processor's seconds and the most megabytes of one task."""
+    make, _, small, large = CASES[name]
     with tempfile.TemporaryDirectory() as folder:
         warm, whole = Path(folder, "warm"), Path(folder, "whole")
-        warm.mkdir(), whole.mkdir()
-        make, _, small, large = CASES[name]
-        make(warm, min(small + large))()
+        warm.mkdir()
+        whole.mkdir()
+        make(warm, min(small + large))()  # loops are compiled by the smallest
         task = make(whole, size)
         start = time.process_time()
         task()
@@ -287,4 +295,4 @@ if __name__ == "__main__":
     if sys.argv[1:2] == ["--one"]:
         once(sys.argv[2], int(sys.argv[3]))
     else:
-        main(sys.argv[1:] or list(CASES))
+        main(sys.argv[1:] or [*CASES])

@@ -296,7 +296,7 @@ def test_an_interval_without_ends_is_an_error_of_the_program():
 
 
 def test_rows_that_few_points_cannot_place_are_looked_at_with_more():
-    """Property: of 36 rows the first look, with 16 points, cannot place 9; none is left to draws."""
+    """Property: of 36 rows a first look, with 16 points, cannot place 9; none is left to draws."""
     size, none = np.linspace(0.5, 4, 36), np.zeros(36)
     hessian = np.zeros((1, 3, 3))
     hessian[0, 0, 1] = hessian[0, 1, 0] = 0.03
