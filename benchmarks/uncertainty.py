@@ -7,9 +7,9 @@ A tank of eight courses with a ring of fourteen points each, and 130 inputs: 112
 covariance; scale, datum, offset, barrel, plate, paint, shell temperature and expansion, each
 correlated with every other; the heights of the courses and two fittings, independent. The goal:
 volumes, u, degrees of freedom, k and U of all rows within 4 ms, GTC's time by some 4000; no step
-of them (`STEPS`: a linear map of the values and of the factor of their covariance, or what is made
-of it) above 0.5 ms; and every u as the others find it to 1e-12 of itself. A table is 5 MB of fresh
-memory: where the system is slow to hand out pages, that is a third of its time.
+of them (`steps_of`: a linear map of the values and of the factor of their covariance, or what is
+made of it) above 0.5 ms; and every u as the others find it to 1e-12 of itself. A table is 5 MB of
+fresh memory: where the system is slow to hand out pages, that is a third of its time.
 
 The peers have the same inputs and the tank in plain arithmetic (`Plain`), as lean as can be: one
 area for each course, made once. They give value and u. Each has 20 s in five interleaved rounds for
