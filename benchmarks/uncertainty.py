@@ -6,9 +6,9 @@ A tank of eight courses with a ring of fourteen points each, and 130 inputs: 112
 covariance; scale, datum, offset, barrel, plate, paint, shell temperature and expansion, each
 correlated with every other; the heights of the courses and two fittings, independent. The goal:
 volumes, u, degrees of freedom, k and U of all rows within 4 ms, GTC's time by some 4000; no step
-of them (`STEPS`: a linear map of the values and of the factor of their covariance, or what is made
-of it) above 0.5 ms; and every u as the others find it to 1e-12 of itself. A table is 5 MB of fresh
-memory: where the system is slow to hand out pages, that is a third of its time.
+of them (`steps_of`: a linear map of the values and of the factor of their covariance, or what is
+made of it) above 0.5 ms; and every u as the others find it to 1e-12 of itself. A table is 5 MB of
+fresh memory: where the system is slow to hand out pages, that is a third of its time.
 
 The peers have the same inputs and the tank in plain arithmetic (`Plain`), as lean as can be: one
 area for each course, made once. They give value and u. Each has 20 s in five interleaved rounds for
@@ -286,16 +286,21 @@ def main():
                  digits=(own, theirs), note=note, **about))  # fmt: skip
     if not peers:
         tell(Row(name, size, seconds["tankcal"], digits=(own, None), **about))
-    for what, task in steps_of(body, case.heights_m).items():
-        tell(Row(f"step of it: {what}", size, interleaved({"": lambda: of_many(task)}, ROUNDS)[""]))
+    steps = {what: of_many(task) for what, task in steps_of(body, case.heights_m).items()}
+    for what, spent in interleaved(steps, ROUNDS).items():
+        tell(Row(f"step of it: {what}", size, spent))
 
 
 def of_many(task):
-    """Seconds of processor of a task that is over in a fraction of a millisecond."""
-    start = time.process_time()
-    for _ in range(TABLES):
-        task()
-    return (time.process_time() - start) / TABLES
+    """A task that gives the seconds of processor of another, which is over in a blink."""
+
+    def seconds():
+        start = time.process_time()
+        for _ in range(TABLES):
+            task()
+        return (time.process_time() - start) / TABLES
+
+    return seconds
 
 
 if __name__ == "__main__":

@@ -39,9 +39,11 @@ def read_covariance(data, names, log, archive=OF_POINTS):
     if len(names) > MAX_POINTS:
         expected = message(
             "covariance_too_many",
-            "{count} points; expected at most {most} with a full covariance",
+            "{count} points; expected at most {most} with a full covariance, which is {megabytes}"
+            " MB for these and four times that for twice the points",
             count=len(names),
             most=MAX_POINTS,
+            megabytes=round(8e-6 * (archive.each * len(names)) ** 2),
         )
         log.problem(archive.file, expected)
         return None

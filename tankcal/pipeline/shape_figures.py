@@ -7,6 +7,7 @@ off, and the head of the survey's liquid.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from tankcal.geometry.field.components import COMPONENTS, KINDS
 from tankcal.geometry.field.values import FieldValues, Spots
@@ -174,14 +175,14 @@ class ShapeBase:
         return found
 
     def figures(self, rows):
-        """`Figures` of rows (r, f)."""
+        """`Figures` of rows (r, f), each of which is of a few places."""
+        rows = scipy.sparse.csr_array(rows)
         value = rows @ self._value_m
         value += rows[:, self._count :] @ self._origins()
-        variances = [np.einsum("ij,jk,ik->i", rows, one, rows, optimize=True)
-                     for one in self._unseen()]  # fmt: skip
+        variances = [rows.multiply(rows @ one).sum(axis=1) for one in self._unseen()]
         parts = [Source("", np.sqrt(np.maximum(one, 0.0))[:, None]) for one in variances]
         by_survey = [one.mapped(lambda columns: rows @ columns) for one in self._sources]
-        told = combine([*by_survey, *parts], len(rows))
+        told = combine([*by_survey, *parts], len(value))
         return Figures(value, np.maximum(told.u, LEAST_U_M), told.effective_dof)
 
     def _origins(self):

@@ -102,8 +102,10 @@ def _refuse_size(n):
             message(
                 "wall_too_large",
                 "{n} points of the wall were adjusted; at most {largest} can be used with "
-                "their full covariance: name the targets to use in targets.csv",
+                "their full covariance, {megabytes} MB for all of them and four times that for "
+                "twice the points: name the targets to use in targets.csv",
                 n=n,
                 largest=LARGEST,
+                megabytes=round(8e-6 * (3 * n) ** 2),
             )
         )

@@ -10,6 +10,7 @@ from tankcal.gum.monte_carlo import Goal, QuadraticRows, numerical_tolerance, si
 from tankcal.gum.monte_carlo.goal import simulation
 from tankcal.gum.monte_carlo.inputs import inputs_of
 from tankcal.gum.monte_carlo.linear import linear_law, shapes_of
+from tankcal.gum.monte_carlo.quadratic_rows import POINTS, SETS
 from tankcal.uncertainty import coverage_factor
 
 EXACT_RECTANGULAR = 2 * np.sqrt(3) * (2 - (3 / 5) ** 0.25)
@@ -292,3 +293,14 @@ def test_an_interval_without_ends_is_an_error_of_the_program():
     estimates = np.array([[5.0], [1.0], [3.0], [7.0], [3.0], [np.nan]])
     with pytest.raises(ProgramError, match="contradicts itself"):
         simulation(Goal(), estimates, np.zeros((6, 1)), np.ones(1), np.ones(1, dtype=bool))
+
+
+def test_rows_that_few_points_cannot_place_are_looked_at_with_more():
+    """Property: of 36 rows a first look, with 16 points, cannot place 9; none is left to draws."""
+    size, none = np.linspace(0.5, 4, 36), np.zeros(36)
+    hessian = np.zeros((1, 3, 3))
+    hessian[0, 0, 1] = hessian[0, 1, 0] = 0.03
+    jacobian = np.column_stack([size, 0.3 * size, none + 0.2])
+    model = QuadraticRows(none, jacobian, hessian, np.ones((36, 1)), np.zeros(3))
+    found = simulate(model, [rectangular(1.0), Normal(1.0), Normal(1.0)], goal=SOME)
+    assert np.all(found.draws == SETS * POINTS)

@@ -155,7 +155,8 @@ def _root(gap, slope, bend):
     """t nearest to 0 with slope t + bend t^2 = gap; +-inf with the side where none is."""
     inside = slope**2 + (4 * bend) * gap
     lost = inside.min() <= 0 or slope.min() <= 0
-    root = 2 * gap / (slope + np.sqrt(np.maximum(inside, 0.0) if lost else inside))
+    with np.errstate(divide="ignore", invalid="ignore"):  # where there is none
+        root = 2 * gap / (slope + np.sqrt(np.maximum(inside, 0.0) if lost else inside))
     if lost:
         root = np.where((inside <= 0) | (slope <= 0), np.copysign(np.inf, gap), root)
     return root

@@ -16,7 +16,7 @@ from tankcal.gum.monte_carlo.sobol import sobol_points
 SETS = 10  # independent point sets
 POINTS = 2048  # of a set; intervals take FIRST to MOST of them
 FIRST, MOST = 8, 1024  # eight of each set are mostly worth 1e7 plain draws
-PILOT = 16  # points of the first set that place the ends before they are estimated
+PILOT = 16, 64  # points of the first set that place the ends: at first, and where they are too few
 SIDES = np.array([0.6, 1.0, 1.4])  # levels about an end, by that end's own
 
 
@@ -48,11 +48,12 @@ def table_estimates(model, ready, goal, progress):
         ends, steady = found.of(pending, count)
         estimates[2:, pending], errors[2:, pending] = _mean_and_error(ends)
         part = estimates[:, pending], errors[:, pending], plain[:, pending]
-        # more points may show what fewer hid: a row that was sound with 16 need not stay so
+        # more points may show what fewer hid: a row that was sound with 8 need not stay so
         sound[pending] = steady & as_good_as_plain(goal, *part)
         part[1][:2] = 0.0  # mean and u come from all points already
-        done = may_stop(goal, *part)
-        pending, count = pending[~done & steady], 4 * count
+        # the first points may be too few to place the ends of a row that is steady
+        again = np.where(steady, ~may_stop(goal, *part), count == FIRST)
+        pending, count = pending[again], 4 * count
         progress("Monte Carlo", len(law.known) - len(pending), len(law.known))
     return estimates, errors, draws, law.known.copy(), sound
 
@@ -120,7 +121,7 @@ class _Ends:
             if not len(block):
                 continue
             at = place[block]
-            target, unbent = self._targets(along, block)
+            target, unbent = self._targets(along, block, PILOT[count > FIRST])
             scores, near = self._scores(along, block, target, count)
             rising = np.all(np.diff(scores, axis=2) > 0, axis=(0, 2))
             sound = np.flatnonzero(unbent & rising & (near <= RARE))
@@ -131,10 +132,10 @@ class _Ends:
             steady[at[sound]] = inner
         return ends, steady
 
-    def _targets(self, along, block):
-        """(block, levels) values near the levels, from the pilot draws, and which are found."""
+    def _targets(self, along, block, count):
+        """(block, levels) values near the levels, from `count` draws, and which are found."""
         linear, slope = self.law.quantile[block], self.law.density[block]
-        pilot = self.sets[:1, :PILOT], self.forms[:1, :PILOT]
+        pilot = self.sets[:1, :count], self.forms[:1, :count]
         shift = np.mean(pilot[1][0] @ self.lines.rows.weights[block].T, axis=0)
         target = linear + shift[:, None]
         for _ in range(2):

@@ -20,8 +20,8 @@ def too_many_hits(count):
     """What is said of more hits than can be used."""
     return message(
         "too_many_hits",
-        "{count} hits; expected at most {most}: with more, take every second one or hand them"
-        " in as points.csv",
+        "{count} hits; expected at most {most}, for the covariance of each with each is kept, four"
+        " times as much for twice the hits: take every second one or hand them in as points.csv",
         count=count,
         most=MOST_HITS,
     )

@@ -17,7 +17,8 @@ def too_many_tangents(count):
     """What is said of more tangents than can be used."""
     return message(
         "too_many_tangents",
-        "{count} tangents; expected at most {most}",
+        "{count} tangents; expected at most {most}, for the covariance of each with each is kept,"
+        " four times as much for twice the tangents: take every second one",
         count=count,
         most=MOST_TANGENTS,
     )

@@ -47,7 +47,8 @@ def check_points(points, log):
     if len(points.rows) > MAX_POINTS:
         expected = message(
             "points_too_many",
-            "{count} points; expected at most {most}: thin the scan first",
+            "{count} points; expected at most {most}, for the record keeps each of them: hand a"
+            " larger scan in as its files (clouds.toml), of which any number is read",
             count=len(points.rows),
             most=MAX_POINTS,
         )
