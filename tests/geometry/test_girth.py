@@ -4,10 +4,17 @@ import numpy as np
 import pytest
 from generated_strapping import girth_of
 from generated_walls import FAMILIES, job_of, make_wall, survey
+from scipy.spatial import ConvexHull
 
 from tankcal.geometry.field.amplitudes import Amplitudes
 from tankcal.geometry.field.components import COMPONENTS
-from tankcal.geometry.girth import Ring, _excess_of, perimeter_excess, seen_excess
+from tankcal.geometry.girth import (
+    Ring,
+    _excess_of,
+    hull_perimeter_m,
+    perimeter_excess,
+    seen_excess,
+)
 from tankcal.pipeline.wall import find_wall
 from tankcal.pipeline.wall_straps import area_term
 
@@ -21,6 +28,20 @@ def test_a_sum_of_waves(orders, percent):
         0.020 * (2 / k) ** 1.5 * np.cos(k * TURN - 0.7 * k) for k in range(2, orders + 1)
     )
     assert 100 * _excess_of(radius) == pytest.approx(percent, abs=6e-5)
+
+
+@pytest.mark.parametrize("valley_m", [1e-4, 0.02, 0.4, 3.0])
+@pytest.mark.parametrize("order", [2, 5, 31])
+def test_perimeter_of_a_hull(valley_m, order):
+    """Second method: Qhull, on outlines from smooth to star-shaped, with cusps and noise."""
+    rng = np.random.default_rng(order)
+    turn = TURN[::8]
+    radius = 6.5 + valley_m * np.cos(order * turn) - 0.3 * valley_m * np.abs(np.sin(7 * turn))
+    for noise in (0.0, 1e-3 * valley_m):
+        one = radius + noise * rng.normal(size=len(turn))
+        x, y = one * np.cos(turn), one * np.sin(turn)
+        expected = ConvexHull(np.column_stack([x, y])).area
+        assert hull_perimeter_m(x, y) == pytest.approx(expected, rel=1e-13)
 
 
 def test_a_tape_bridges_what_is_concave():
