@@ -35,8 +35,7 @@ def plumbed_job(
     rng, wall, *, lines, folder, faces=2, levels=2, sd_m=0.0005, lean=0.002, off_m=2e-3
 ):
     """A Job whose first course was strapped and whose others were read from so many lines."""
-    job = strapped_job(rng, wall, straps=2, folder=folder)
-    first = tuple(one for one in job.strapping.straps if one.course == "1")
+    job = strapped_job(rng, wall, straps=2, folder=folder, courses=1)
     azimuth = FULL_TURN * np.arange(lines) / lines
     slope, plate = lean * rng.normal(size=2), job.courses[0].thickness_m
     constants = rng.uniform(0.15, 0.25, lines)
@@ -63,5 +62,4 @@ def plumbed_job(
         tuple(offsets),
         {"ZL": Plummet("ZL", u_collimation_rad=u)},
     )
-    straps = replace(job.strapping, straps=first)
-    return replace(job, strapping=straps, lines=given), {"slope": slope, "kappa": kappa}
+    return replace(job, lines=given), {"slope": slope, "kappa": kappa}

@@ -49,8 +49,11 @@ def _any_job(folder):
     return tankcal.load(write_strapped_job(folder))
 
 
-def strapped_job(rng, wall, *, straps, folder, laying_m=0.0005, shape_sd_m=None):
-    """A Job whose wall was strapped at so many levels of each course; shape_sd_m None: its own."""
+def strapped_job(rng, wall, *, straps, folder, laying_m=0.0005, shape_sd_m=None, courses=None):
+    """A Job whose wall was strapped at so many levels of each course; shape_sd_m None: its own.
+
+    courses  that are strapped, from the bottom up; None: all. The draws are the same
+    """
     job = _any_job(folder)
     shell_c = job.survey.shell_temperature_c
     warmer = rng.uniform(-2, 2)  # than the crew read
@@ -66,8 +69,11 @@ def strapped_job(rng, wall, *, straps, folder, laying_m=0.0005, shape_sd_m=None)
     readings = []
     for course in range(wall.courses):
         for part in LEVELS[straps]:
+            laid = laying_m * rng.normal()
+            if courses is not None and course >= courses:
+                continue
             girth = grown * girth_of(wall, course, 2 * part - 1, plate) + np.pi * TAPE_M
-            reading = girth / unit + laying_m * rng.normal()
+            reading = girth / unit + laid
             level = (course + part) * wall.course_m
             name = f"{course + 1}-{part}"
             readings.append(

@@ -69,7 +69,7 @@ class GeneratedWall:
     def radius_at(self, course, zeta, azimuth):
         """(n,) radii at (n,) places."""
         found = np.full(len(azimuth), self.radius_m)
-        for one in range(self.courses):
+        for one in np.unique(course):
             mine = course == one
             for around, up in self.terms[one]:
                 found[mine] += around(azimuth[mine]) * up(zeta[mine])

@@ -243,7 +243,7 @@ def _of_ends(form):
 TABLE = (
     Plausible(
         "survey.date",
-        f"year {FIRST_YEAR} to today (problem)",
+        f"year {FIRST_YEAR} to today, of a plan up to {YEARS_PLANNED} years ahead (problem)",
         "1024 for 2024, a day to come",
         "today's date",
         ("survey_date_impossible",),

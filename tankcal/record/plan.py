@@ -26,14 +26,13 @@ class PlannedDatum(Saved):
     scale: bool = key("whether observations determine the scale")
 
 
-class PlannedSurvey(Saved, kw_only=True):
+class PlannedSurvey(Saved):
     """How large the survey is."""
 
     photo_stations: int = key("number")
     photographs: int = key("number")
     setups: int = key("number")
-    ties: int = key("number")
-    bases: int = key("that a stadia is read over", default=0)
+    ties: int = key("number, bases of a stadia among them")
     control_points: int = key("number")
     targets: int = key("number")
     observations: int = key("values")
@@ -169,8 +168,7 @@ def _survey(prediction):
         photo_stations=len(plan.stations),
         photographs=len(plan.photos),
         setups=len(plan.setups),
-        ties=len(plan.ties),
-        bases=len(by_ends(plan.bases)),
+        ties=len(plan.ties) + len(by_ends(plan.bases)),
         control_points=len(plan.known),
         targets=len(plan.targets.names),
         observations=solution.rows,

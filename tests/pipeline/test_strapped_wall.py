@@ -464,3 +464,17 @@ def test_bad_input_is_told(tmp_path, code):
     found = {one.expected.code for one in refused.value.problems}
     assert code.split()[0] in found, refused.value
     assert all("\n" not in str(one) for one in refused.value.problems)
+
+
+def test_what_a_master_lacks_is_told_of_the_master(tmp_path):
+    """Its certificate counts: the working tape's own temperature stands there, and is no help."""
+    parts = strapped_parts()
+    tape = parts.registers["instruments"]["T-12"] | {"expansion_per_k": 1.15e-5}
+    master = tape | {"certified_temperature_c": None, "expansion_per_k": None}
+    master = {key: value for key, value in master.items() if value is not None}
+    parts.registers["instruments"] |= {"T-12": tape | {"master": "M"}, "M": master}
+    with pytest.raises(InputError) as refused:
+        tankcal.load(write_folder(tmp_path, parts))
+    places = {one.column for one in refused.value.problems}
+    assert "M.certified_temperature_c" in places
+    assert "T-12.certified_temperature_c" not in places

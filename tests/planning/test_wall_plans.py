@@ -404,6 +404,16 @@ def test_bad_input_is_one_line_each(tmp_path, name, capsys):
         assert place in {(one.file, one.column) for one in error.value.problems}
 
 
+def test_side_that_no_set_up_is_on_is_told_of_the_plan(tmp_path):
+    """What the chain says of settings is said of plan.toml: a plan has no job.toml."""
+    text = (HITS / "plan.toml").read_text(encoding="utf-8")
+    side, other = ("inside", "outside") if 'side = "inside"' in text else ("outside", "inside")
+    folder = plan_of(tmp_path / "plan", HITS, (f'side = "{side}"', f'side = "{other}"'))
+    with pytest.raises(InputError) as error:
+        predict(load_plan(folder))
+    assert {one.file for one in error.value.problems} <= {"plan.toml", "uncertainty.csv"}
+
+
 CONTROL = "[control_targets]\nevery_min = 45\n[limits]"
 TOLD = [  # of a plan, what is changed in it, the whole line in the column
     (HITS, "hits = 20 ", "hits = 2 ", "hits[1].hits: found 2; expected 3 or more"),

@@ -11,6 +11,8 @@ from job_builder import tangent_parts, write_book, write_folder
 
 import tankcal
 from tankcal.errors import InputError
+from tankcal.job.checks.hits import ranging_of
+from tankcal.job.checks.lines import plummets_of
 from tankcal.pipeline.stadia_checks import check_bases
 
 BAR = {"kind": "stadia", "length_m": 2.0, "u_mm": 0.02, "certificate": "B-1"}
@@ -131,3 +133,10 @@ def test_bad_input_is_one_line(tmp_path, spoil):
     with pytest.raises(InputError) as error:
         loaded(tmp_path, parts)
     assert [(one.file, one.column) for one in error.value.problems] == [wanted]
+
+
+def test_a_bar_ranges_nothing_and_makes_no_line():
+    """Property: beside it the only total station is still the one that a blank name means."""
+    kinds = {"TS": "total_station", "bar": "stadia", "T-12": "tape"}
+    registers = {"instruments": {name: {"kind": kind} for name, kind in kinds.items()}}
+    assert [*ranging_of(registers)] == [*plummets_of(registers)] == ["TS"]

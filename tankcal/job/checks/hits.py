@@ -10,7 +10,7 @@ from tankcal.job.checks.survey.readings import check_angle
 from tankcal.job.contract.registers import FREE
 from tankcal.messages import message
 
-PLUMMET = "plummet"  # kind of instrument that ranges nothing
+RANGE_NOTHING = ("plummet", "stadia", "level")  # kinds of instruments
 MOST_HITS = 2500  # whose full covariance is kept
 FEWEST_HITS = 5  # of a section of the wall
 RANGES = ("slope_distances", "distances")  # tables by which a network tells an offset
@@ -86,12 +86,12 @@ def _check_readings(files, table, *, is_needed):
 
 
 def ranging_of(registers):
-    """{name: {key: value}} of the instruments that may range: all but tapes and plummets."""
+    """{name: {key: value}} of the instruments that may range: no tape, plummet, stadia or level."""
     instruments, tapes = registers["instruments"], tapes_of(registers)
     return {
         name: given
         for name, given in instruments.items()
-        if name not in tapes and (given["kind"] or "").lower() != PLUMMET
+        if name not in tapes and (given["kind"] or "").strip().lower() not in RANGE_NOTHING
     }
 
 

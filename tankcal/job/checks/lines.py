@@ -10,6 +10,7 @@ from tankcal.job.checks.strapping import (
     refuse_others,
     tapes_of,
 )
+from tankcal.job.checks.survey.stadia import is_bar
 from tankcal.job.contract.registers import REGISTER_KEYS
 from tankcal.job.tables import nearest
 from tankcal.messages import message
@@ -82,12 +83,16 @@ def check_lines(values, tables, registers, raw, log):
 
 
 def plummets_of(registers):
-    """{name: {key: value}} of the instruments that may make upright lines: all but tapes.
+    """{name: {key: value}} of the instruments that may make upright lines: no tape, no stadia.
 
     Without any there is one that nobody describes, of a blank name.
     """
     instruments, tapes = registers["instruments"], tapes_of(registers)
-    found = {name: given for name, given in instruments.items() if name not in tapes}
+    found = {
+        name: given
+        for name, given in instruments.items()
+        if name not in tapes and not is_bar(given["kind"])
+    }
     return found or {NAMELESS: {field.name: None for field in REGISTER_KEYS["instruments"]}}
 
 

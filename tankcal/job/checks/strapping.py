@@ -195,8 +195,11 @@ def _check_tapes(straps, instruments, tapes, raw, log):
         if given is None:
             continue
         refuse_free_scale(given, file, rows.get(name), name, log)
-        for key, expected in _missing_of(given, tapes):
-            log.problem(file, expected, rows.get(name), f"{name}.{key}")
+        certified = given["master"] if given["master"] in tapes else name  # whose counts
+        found = [(name, *one) for one in _missing_of(given, tapes)]
+        found += [(certified, *one) for one in _missing_of_certificate(given, tapes[certified])]
+        for owner, key, expected in found:
+            log.problem(file, expected, rows.get(owner), f"{owner}.{key}")
 
 
 def _check_pulls(straps, log):
@@ -241,7 +244,10 @@ def _missing_of(given, tapes):
             master=master,
         )
         yield "master", expected
-    certificate = tapes.get(master, given)
+
+
+def _missing_of_certificate(given, certificate):
+    """What a tape needs of its certificate, which is that of its master where it has one."""
     if given["expansion_per_k"] and certificate["certified_temperature_c"] is None:
         yield "certified_temperature_c", temperature_missing()
     if given["section_mm2"] and certificate["tension_n"] is None:

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from tankcal.errors import InputError
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.estimate import LEVELS
 from tankcal.geometry.field.information import expect_amplitudes
@@ -176,7 +177,10 @@ def predict_wall(plan):
     SolutionError
         When they do not determine the wall.
     """
-    tabled = foresee_table(plan.job, plan.amplitudes)
+    try:
+        tabled = foresee_table(plan.job, plan.amplitudes)
+    except InputError as error:
+        raise InputError(told_of_plan(error.problems, plan.design)) from error
     tall = sum(one.height_m for one in plan.job.courses) or tabled.made.top_m
     refuse_without_delivery(plan, tabled, tall)
     refuse_other_dips(plan.dips_m, tabled.made)
