@@ -14,6 +14,7 @@ from tankcal.geometry.field.components import (
     COMPONENTS,
     azimuth_correlations,
     joint_profile,
+    plate_profiles,
     seam_correlation,
 )
 from tankcal.geometry.field.estimate import LEVELS, WallField, gauss_heights
@@ -87,6 +88,15 @@ def test_a_component_of_unit_variance_has_unit_rms(one):
 def test_the_profile_of_joints_has_no_mean():
     node, weight = np.polynomial.legendre.leggauss(400)
     assert weight @ joint_profile(node) == pytest.approx(0.0, abs=1e-4)
+
+
+def test_a_plate_bulges_between_a_parabola_and_a_bell():
+    """Closed form: (1 - z^2)^2 with joints that do not turn, and 0.4 of the way to 1 - z^2."""
+    z = np.linspace(-1, 1, 41)
+    bell, turned = plate_profiles(z).T
+    expected = (1 - z**2) ** 2 - 8 / 15
+    assert bell / bell[20] == pytest.approx(expected / expected[20])
+    assert turned / bell[20] == pytest.approx(0.4 * (expected - (1 / 3 - z**2)) / expected[20])
 
 
 WELDS = (np.array([0.5, 3.0]), np.array([1.0]), np.array([2.0]))
