@@ -272,7 +272,6 @@ def _outline(rng, variances_m2, radius_m):
 def _excess_of(radii_m):
     """P^2 / (4 pi A) - 1 of the hull's perimeter and the outline's area, radii at even azimuths."""
     turn = FULL_TURN * np.arange(len(radii_m)) / len(radii_m)
-<<<<<<< HEAD
     chords = (turn[1] / np.sin(turn[1] / 2) / 2) ** 2  # of the polygon of a circle, to its arcs
     perimeter_m = hull_perimeter(radii_m * np.exp(1j * turn))
     return chords * perimeter_m**2 / (2 * np.sum(radii_m**2) * turn[1] * np.pi) - 1
@@ -288,25 +287,10 @@ def hull_perimeter(places):
     ----------
     places : ndarray of complex, shape (n,)
         x + i y of the points, anticlockwise, neighbours less than half a turn apart.
-=======
-    girth = hull_perimeter_m(radii_m * np.cos(turn), radii_m * np.sin(turn))
-    chords = (turn[1] / np.sin(turn[1] / 2) / 2) ** 2  # of the polygon of a circle, to its arcs
-    return chords * girth**2 / (2 * np.sum(radii_m**2) * turn[1] * np.pi) - 1
-
-
-def hull_perimeter_m(x_m, y_m):
-    """Perimeter of the convex hull of a polygon that its centre sees whole.
-
-    Parameters
-    ----------
-    x_m, y_m : ndarray, shape (n,)
-        Corners about the origin, anticlockwise, m.
->>>>>>> h2
 
     Returns
     -------
     float
-<<<<<<< HEAD
         In the unit of the points.
 
     Examples
@@ -320,28 +304,3 @@ def hull_perimeter_m(x_m, y_m):
         if outer.all():
             return float(np.abs(after).sum())
         places = places[outer]
-=======
-        m.
-
-    Notes
-    -----
-    A corner that bends inwards lies within the hull, and without it the origin still sees the rest
-    of the polygon whole: all of them go at once, again and again, until none is left. Outlines of
-    walls take some ten rounds.
-
-    Examples
-    --------
-    >>> x, y = np.array([1.0, 0.2, 0.0, -1.0, 0.0]), np.array([0.0, 0.2, 1.0, 0.0, -1.0])
-    >>> round(float(hull_perimeter_m(x, y) / np.sqrt(2)), 12)  # of a square with a notch
-    4.0
-    """
-    while True:
-        east, north = np.diff(x_m, append=x_m[0]), np.diff(y_m, append=y_m[0])
-        bend = np.empty_like(x_m)
-        bend[1:] = east[:-1] * north[1:] - north[:-1] * east[1:]
-        bend[0] = east[-1] * north[0] - north[-1] * east[0]
-        outer = bend > 0
-        if outer.all():
-            return float(np.sum(np.hypot(east, north)))
-        x_m, y_m = x_m[outer], y_m[outer]
->>>>>>> h2

@@ -13,7 +13,9 @@ from tankcal.geometry.field.cells import cells_of, sites_of_cells
 from tankcal.geometry.field.components import (
     COMPONENTS,
     azimuth_correlations,
+    hidden_seams_m,
     joint_profile,
+    plate_profiles,
     seam_correlation,
 )
 from tankcal.geometry.field.estimate import LEVELS, WallField, gauss_heights
@@ -87,6 +89,38 @@ def test_a_component_of_unit_variance_has_unit_rms(one):
 def test_the_profile_of_joints_has_no_mean():
     node, weight = np.polynomial.legendre.leggauss(400)
     assert weight @ joint_profile(node) == pytest.approx(0.0, abs=1e-4)
+
+
+def test_a_plate_bulges_between_a_parabola_and_a_bell():
+    """Closed form: (1 - z^2)^2 with joints that do not turn, and 0.4 of the way to 1 - z^2."""
+    z = np.linspace(-1, 1, 41)
+    bell, turned = plate_profiles(z).T
+    expected = (1 - z**2) ** 2 - 8 / 15
+    assert bell / bell[20] == pytest.approx(expected / expected[20])
+    assert turned / bell[20] == pytest.approx(0.4 * (expected - (1 / 3 - z**2)) / expected[20])
+
+
+@pytest.mark.parametrize("columns", [60, 66, 72, 80])
+def test_seams_between_columns_are_those_of_random_places(columns):
+    """Simulation: two seams of 40 mm, cos^2 over 0.8 m, at all places between even columns."""
+    radius_m, apart_m = 7.5, FULL_TURN * 7.5 / columns
+    away = np.arange(-3, 4)[:, None] * apart_m + np.linspace(0, apart_m, 400, endpoint=False)
+    seen = np.sum(0.040 * np.cos(np.pi / 0.8 * np.clip(away, -0.4, 0.4)) ** 2, axis=0) * apart_m
+    scatter = np.sqrt(2 * np.mean((seen - 0.040 * 0.4) ** 2)) / (FULL_TURN * radius_m)
+    azimuth = FULL_TURN * np.arange(columns) / columns
+    found = hidden_seams_m(azimuth, radius_m)
+    assert found == pytest.approx(scatter, rel=0.06)  # the second harmonic is left out
+
+
+def test_seams_hide_from_columns_alone():
+    """Properties: as large as a seam at most, and nothing where points are dense or tapes lie."""
+    even = FULL_TURN * np.arange(24) / 24
+    one_m = 0.040 * 0.4 / (FULL_TURN * 7.5)
+    assert hidden_seams_m(even, 7.5) == pytest.approx(0.99 * one_m, rel=0.02)
+    assert hidden_seams_m(np.tile(even + 1.0, 3), 7.5) == pytest.approx(hidden_seams_m(even, 7.5))
+    assert hidden_seams_m(even, 30.0) == pytest.approx(one_m / 4)
+    assert hidden_seams_m(np.linspace(0, FULL_TURN, 500), 7.5) < 0.01 * one_m
+    assert hidden_seams_m(np.array([np.nan]), 7.5) == 0.0
 
 
 WELDS = (np.array([0.5, 3.0]), np.array([1.0]), np.array([2.0]))

@@ -28,6 +28,8 @@ SEAM_LENGTH_M = 0.4  # along the arc, of a seam's flank
 WELD_LENGTH_M = 0.2  # the same of a peak at a weld, which is 0.8 m wide in all
 JOINT_LENGTH = 0.2  # of half a course: how far a joint draws the plate in
 LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
+HIDDEN_M, HIDDEN_PART, HIDDEN_WIDTH_M = 0.040, 0.0053, 0.8  # depth, of the radius at most; width
+BELL, BELL_SD = 1.0, 0.4  # of the way from a parabola to a plate whose joints do not turn
 
 _LEVEL = (1,)
 KINDS = ("bulge", "ovality", "seams")
@@ -52,9 +54,9 @@ class Component:
     common : bool
         The same in all courses.
     orders : tuple of float, str
-        Variances of the Legendre polynomials 0, 1, ... in the height, up to a factor; "joints": the
-        profile exp(-(1 - |zeta|) / JOINT_LENGTH) less its mean; "local": the covariance
-        exp(-|zeta - zeta'| / LOCAL_LENGTH).
+        Variances of the Legendre polynomials 0, 1, ... in the height, up to a factor; "plate": of
+        the profiles of `plate_profiles`; "joints": the profile exp(-(1 - |zeta|) / JOINT_LENGTH)
+        less its mean; "local": the covariance exp(-|zeta - zeta'| / LOCAL_LENGTH).
     median_m, log_sd : float
         Median of its amplitude, m, and standard deviation of the logarithm of its variance.
     declared_as : str
@@ -74,6 +76,8 @@ class Component:
         """(n, r) columns whose products are h; not of a component that is local."""
         if self.orders == "joints":
             return joint_profile(zeta)[:, None]
+        if self.orders == "plate":
+            return plate_profiles(zeta)
         used, scale = self._scales
         return legendre(zeta, used[-1])[:, used] * scale
 
@@ -107,13 +111,12 @@ class Component:
         return self.height_columns(zeta) @ self.height_columns(other).T
 
 
-_EVEN = (0, 0, 1, 0, 0.1, 0, 0.02)  # barrels and drawn-in joints share their sign
 _FREE = (0, 0, *(order**-2.0 for order in range(2, 7)))
 _LINEAR = (0, 1)
 COMPONENTS = (
-    Component("common bulge", "bulge", "mean", True, _EVEN, 1.4e-3, 1.0, "barrel"),
-    Component("drawn-in joints", "bulge", "mean", True, "joints", 0.8e-3, 1.2, "barrel"),
-    Component("own bulge", "bulge", "mean", False, _FREE, 0.7e-3, 1.0, "barrel"),
+    Component("common bulge", "bulge", "mean", True, "plate", 1.1e-3, 1.0, "barrel"),
+    Component("drawn-in joints", "bulge", "mean", True, "joints", 0.65e-3, 1.2, "barrel"),
+    Component("own bulge", "bulge", "mean", False, _FREE, 0.6e-3, 1.0, "barrel"),
     Component("taper", "bulge", "mean", False, _LINEAR, 0.8e-3, 1.5, "taper"),
     Component("common ovality", "ovality", "oval", True, _LEVEL, 4e-3, 2.0),
     Component("own ovality", "ovality", "oval", False, _LEVEL, 2e-3, 2.0),
@@ -134,6 +137,19 @@ def legendre(zeta, highest):
     for n in range(2, highest + 1):
         found[:, n] = (2 - 1 / n) * zeta * found[:, n - 1] - (1 - 1 / n) * found[:, n - 2]
     return found
+
+
+def plate_profiles(zeta):
+    """(n, 2) columns whose products are h of a plate that bulges between its joints.
+
+    A plate whose joints turn freely is nearly a parabola, p = 1 - zeta^2; one whose joints do not,
+    b = (1 - zeta^2)^2. What bulges is p + t (b - p), t about BELL with the standard deviation
+    BELL_SD. Less the mean over the course, p = -2/3 P2 and b = -16/21 P2 + 8/35 P4.
+    """
+    free, held = np.array([-2 / 3, 0.0]), np.array([-16 / 21, 8 / 35])  # of P2 and P4
+    shapes = np.array([free + BELL * (held - free), BELL_SD * (held - free)])
+    shapes /= np.sqrt(np.sum(shapes**2 @ [1 / 5, 1 / 9]))
+    return legendre(zeta, 4)[:, [2, 4]] @ shapes.T
 
 
 def joint_profile(zeta):
@@ -217,6 +233,43 @@ def weld_columns(azimuth_rad, welds_rad, radius_m):
     """(n, w) a seam of WELD_LENGTH_M at each weld, of peak one: c(a - weld); 0 of a whole turn."""
     away = np.subtract.outer(azimuth_rad, welds_rad)
     return np.nan_to_num(seam_correlation(away, radius_m, WELD_LENGTH_M))
+
+
+def hidden_seams_m(azimuth_rad, radius_m):
+    """Standard uncertainty of a mean radius by two seams that points need not meet, m.
+
+    Both run up the whole shell, of the depth d and the width w, cos^2 across. Columns of points s
+    apart take each, at a random place between them, for its area A = d w / 2 times 1 + q cos phi,
+
+        q = 2 sinc(w / s) / (1 - (w / s)^2),
+
+    so two make an error of the standard deviation q A. Where s > w a seam may be missed altogether:
+    q = 1. Of seams that points do meet the readings tell. Gaps count by their share of the turn.
+
+    Parameters
+    ----------
+    azimuth_rad : ndarray, shape (n,)
+        Of the points, in all courses; nan: a whole turn, which misses nothing.
+    radius_m : float
+        Of the tank, m.
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> round(1e3 * hidden_seams_m(np.arange(72) * FULL_TURN / 72, 7.5), 2)
+    0.23
+    """
+    around = np.unique(azimuth_rad[np.isfinite(azimuth_rad)] % FULL_TURN)
+    if not len(around):
+        return 0.0
+    apart = np.diff(around, append=around[0] + FULL_TURN)
+    ratio = np.maximum(HIDDEN_WIDTH_M / (radius_m * apart), 1 + 1e-9)
+    parts = 2 * np.sinc(ratio) / (1 - ratio**2)
+    area = min(HIDDEN_M, HIDDEN_PART * radius_m) * HIDDEN_WIDTH_M / 2
+    return area / (FULL_TURN * radius_m) * float(np.sqrt(parts**2 @ apart / FULL_TURN))
 
 
 def mode_shares(modes, radius_m):

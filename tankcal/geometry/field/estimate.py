@@ -21,7 +21,12 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.geometry.field.amplitudes import Amplitudes
-from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, weld_columns
+from tankcal.geometry.field.components import (
+    COMPONENTS,
+    azimuth_correlations,
+    hidden_seams_m,
+    weld_columns,
+)
 from tankcal.geometry.field.covariances import Covariances, without_rounding
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
 from tankcal.geometry.field.sites import Sites, free_design
@@ -292,6 +297,13 @@ class Functionals:
         size = self._field.amplitudes.variances_m2[index]
         spread = size * self._field._covariances.spread(self.weights, index)
         return without_rounding(self._within(index) - seen - seen.T + spread)
+
+    @property
+    def hidden_seams(self):
+        """(f,) standard uncertainty by seams between the columns of points, of one sign in all."""
+        sites, radius_m = self._field.sites, self._field.nominal_m
+        at_points = self.weights[:, np.isfinite(sites.azimuth_rad)].sum(axis=1)
+        return hidden_seams_m(sites.azimuth_rad, radius_m) * at_points
 
     def _with_component(self, index):
         """(f, n) covariance of the functionals with one component at the sites."""

@@ -326,7 +326,8 @@ def _factors(job, wall, volume, features):
 def _of_the_unseen(wall, volume, features, declared):
     """A `Factor` of each kind of component that the survey did not see all of.
 
-    What was declared, a barrel or a taper, is not counted again.
+    What was declared, a barrel or a taper, is not counted again. Seams count as those that points
+    need not meet at least, for their readings cannot say that there are none.
     """
     amplitudes, top = wall.field.amplitudes, volume.weights_m([volume.height_m])[0]
     inflation, assumed, found = amplitudes.inflation(), amplitudes.assumed_share(), []
@@ -340,11 +341,22 @@ def _of_the_unseen(wall, volume, features, declared):
         ]
         if chosen:
             parts = [inflation[index] * features.unseen(index) for index in chosen]
+            told = assumed[chosen]
+            if kind == "seams":
+                parts.append(_of_hidden_seams(features, top, sum(parts)))
+                told = np.append(told, 1.0)
             sizes = np.maximum([top @ part @ top for part in parts], 1e-30)
-            known = told_by(float(sizes @ assumed[chosen] / sizes.sum()))
+            known = told_by(float(sizes @ told / sizes.sum()))
             by = "B" if known == "assumed" else "A"
             found.append(Factor(kind, factor_of(sum(parts)), type=by, note=known))
     return tuple(one for one in found if one.columns.shape[1])
+
+
+def _of_hidden_seams(features, top, known):
+    """(f, f) covariance by which what is known of seams is short of those that points may miss."""
+    hidden = features.hidden_seams
+    least = max((top @ hidden) ** 2, 1e-30)
+    return max(1 - top @ known @ top / least, 0.0) * np.outer(hidden, hidden)
 
 
 def _functionals(wall, volume):
