@@ -7,21 +7,22 @@ is still true.
 
 Compiling takes 7 s, once on a machine, and loading what was kept 0.4 s in each run. The array form
 needs about 12 us for an image point in an iteration (elimination included), compiled loops less
-than a tenth of that. So the work is left to arrays until there is enough of it: no small job waits
-for a compiler, and less is enough where compiled loops lie beside the package, made at installation
-by `python -m tankcal.cli.kernels`. They are read from there also where nothing may be written.
+than a tenth of that. So arrays do the work of small problems: no small job waits for a compiler,
+and fewer rows are enough where compiled loops lie beside the package, made at installation by
+`python -m tankcal.cli.kernels`. They are read from there also where nothing may be written.
 TANKCAL_COMPILED=1 compiles at first use, 0 never.
 """
 
 import importlib.util
 import os
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
 from types import FunctionType, SimpleNamespace
 
-AT_ONCE = 20_000  # rows of one problem from which compiling pays at once: 0.3 s an iteration
-ENOUGH = 200_000  # rows that arrays have worked through, 3 s, before a compiler is asked
-LOADING = 0.1  # of both is enough where loops need not be compiled, only loaded
+AT_ONCE = 20_000  # rows of a problem from which compiling pays: 0.3 s an iteration
+LOADING = 0.05  # of that is enough where loops need not be compiled, only loaded
 FAST = {"contract", "reassoc", "nsz"}  # sums in any order; NaN and infinity stay what they are
 OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": FAST}
 
@@ -45,30 +46,40 @@ def are_kept():
     return any(Path(__file__).parent.glob("__pycache__/loops._eliminate-*.nbi"))
 
 
-_worked = 0  # rows that arrays have worked through in this process
+_rows = ContextVar("rows of the problem at hand", default=0)
+
+
+@contextmanager
+def problem_of(rows):
+    """A context in which the loops over any part are those of a problem of so many rows."""
+    before = _rows.set(rows)
+    try:
+        yield
+    finally:
+        _rows.reset(before)
 
 
 def is_worth_compiling(rows=0):
-    """Whether compiled loops are to be used, given how much work arrays have done so far.
+    """Whether compiled loops are to be used.
+
+    It hangs on the size of the problem alone, never on what was done before: compiled loops and
+    arrays differ in the last digits, and the same job is to give the same ones.
 
     Parameters
     ----------
     rows : int, default 0
-        Rows of a new problem, named by the first call about it; later calls about it name none.
+        To be worked through, where that is more than those of `problem_of`.
 
     Returns
     -------
     bool
-        False until arrays have worked through enough rows to pay for the compiler, or for loading
-        what it made before; where TANKCAL_COMPILED is 1 or 0: `available()`.
+        False below the rows that pay for the compiler, or for loading what it made before; where
+        TANKCAL_COMPILED is 1 or 0: `available()`.
     """
-    global _worked
     if _asked_for() != "patient":
         return available()
-    share = LOADING if are_kept() else 1.0
-    enough = share * ENOUGH
-    _worked = max(_worked + rows, enough if rows >= share * AT_ONCE else 0)
-    return _worked >= enough and available()
+    enough = LOADING * AT_ONCE if are_kept() else AT_ONCE
+    return max(rows, _rows.get()) >= enough and available()
 
 
 @cache

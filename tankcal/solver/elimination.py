@@ -35,7 +35,7 @@ def add_rows(batch, w, jac, normals):
 
 def eliminate(plan, normals, damping, smallest):
     """Eliminate the blocks in place; the first block that is not determined, or -1."""
-    if is_worth_compiling():
+    if is_worth_compiling(plan.rows):
         return compile_functions(loops, loops.COMPILED)._eliminate(
             normals.v, normals.wide, normals.b, plan.starts, plan.columns, plan.runs, plan.ends,
             plan.alike, normals.t, normals.g, damping, smallest,
@@ -74,7 +74,7 @@ def block_rows(plan, wide):
 
 def back_substitute(plan, normals, reduced):
     """L^-T (y + Y' reduced) of each block (nb, 3); the blocks' step is this with the other sign."""
-    if is_worth_compiling():
+    if is_worth_compiling(plan.rows):
         out = np.empty((plan.blocks, 3))
         compile_functions(loops, loops.COMPILED)._back(
             normals.v, normals.wide, normals.b, plan.starts, plan.columns, reduced, out
@@ -98,7 +98,7 @@ def block_cofactors(plan, normals, inverse):
     """
     cross, out = np.empty((len(plan.columns) + 1, 3)), np.empty((plan.blocks, 3, 3))
     cross[-1] = 0.0
-    if is_worth_compiling():
+    if is_worth_compiling(plan.rows):
         compile_functions(loops, loops.COMPILED)._cofactors(
             normals.v, normals.wide, plan.starts, plan.columns, plan.runs, plan.ends,
             inverse, cross, out,
@@ -120,7 +120,7 @@ def leverage(plan, batch, jac, inverse, cross, cofactors):
     inverse, cross, cofactors  of the reduced unknowns, and as block_cofactors gives them
     """
     spare = plan.reduced
-    if batch.block is not None and is_worth_compiling():
+    if batch.block is not None and is_worth_compiling(plan.rows):
         out = np.empty(jac.shape[:2])
         compile_functions(loops, loops.COMPILED)._leverage(
             jac, batch.block, batch.first, batch.place, batch.cuts,

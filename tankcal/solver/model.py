@@ -176,6 +176,7 @@ class Plan:
     """Structure of the normal equations: nr reduced unknowns, nb blocks of three.
 
     reduced, blocks   nr, nb
+    rows              observations of the largest group
     batches           tuple of Batch
     starts            (nb + 1,) where each block's reduced columns start in `columns`
     columns           (t,) reduced columns of all blocks, ascending in each
@@ -192,6 +193,7 @@ class Plan:
     ends: np.ndarray
     runs: np.ndarray
     alike: np.ndarray
+    rows: int
 
 
 def plan(reduced, blocks, groups):
@@ -221,7 +223,8 @@ def plan(reduced, blocks, groups):
     changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
     alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
     runs = np.searchsorted(ends, starts)
-    return Plan(reduced, blocks, batches, starts, columns, ends, runs, alike)
+    rows = max((len(group.columns) for group in groups), default=0)
+    return Plan(reduced, blocks, batches, starts, columns, ends, runs, alike, rows)
 
 
 def _mark(together, block, cuts, first):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.solver.compiled import is_worth_compiling
+from tankcal.solver.compiled import problem_of
 from tankcal.solver.elimination import add_rows
 from tankcal.solver.model import Normals, plan
 
@@ -47,7 +47,6 @@ class Rows:
         self.parts = tuple(part for g in range(len(model.groups)) for part in self._parts(g))
         self.count = sum(w.size for w in self.misclosures)
         self.weighing = None
-        is_worth_compiling(max((len(w) for w in self.misclosures), default=0))
 
     def _parts(self, number):
         group, w = self.model.groups[number], self.misclosures[number]
@@ -69,6 +68,10 @@ class Rows:
 
         Where half the sum of squares comes out above `most` the rest is left out: infinity.
         """
+        with problem_of(self.plan.rows):
+            return self._add(state, most)
+
+    def _add(self, state, most):
         self.normals.clear()
         cost, weighing = 0.0, 0
         for part in self.parts:
@@ -86,8 +89,9 @@ class Rows:
 
     def evaluate(self, state):
         """Misclosures at a state without derivatives; half their sum of squares."""
-        for part in self.parts:
-            part.fill(state, part.w, part.jac[:0])
+        with problem_of(self.plan.rows):
+            for part in self.parts:
+                part.fill(state, part.w, part.jac[:0])
         return 0.5 * sum(float(np.vdot(w, w)) for w in self.misclosures)
 
     def derivatives(self, state):
@@ -96,7 +100,8 @@ class Rows:
         for group in self.model.groups:
             n, width = group.columns.shape
             w, jac = np.empty((n, group.rows)), np.zeros((n, group.rows, width))
-            group.fill(state, w, jac)
+            with problem_of(self.plan.rows):
+                group.fill(state, w, jac)
             found.append(jac)
         return tuple(found)
 

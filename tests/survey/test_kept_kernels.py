@@ -70,6 +70,5 @@ def test_less_work_is_enough_where_loops_are_kept(monkeypatch):
     monkeypatch.setattr(compiled, "_asked_for", lambda: "patient")
     for kept, rows in ((False, compiled.AT_ONCE), (True, compiled.LOADING * compiled.AT_ONCE)):
         monkeypatch.setattr(compiled, "are_kept", lambda kept=kept: kept)
-        monkeypatch.setattr(compiled, "_worked", 0)
         assert not compiled.is_worth_compiling(rows - 1)
         assert compiled.is_worth_compiling(rows)

@@ -148,18 +148,18 @@ def test_rows_in_parts_give_what_all_of_them_give(survey, adjusted, monkeypatch)
 
 
 def test_small_jobs_do_not_wait_for_a_compiler(monkeypatch):
-    """Arrays until there is enough work; what is large from the start is compiled at once."""
+    """The size of a problem decides, for each part of it; never what was done before."""
     room = tankcal.solver.compiled
     monkeypatch.setattr(room, "available", lambda: True)
     monkeypatch.setattr(room, "_asked_for", lambda: "patient")
     monkeypatch.setattr(room, "are_kept", lambda: False)
-    monkeypatch.setattr(room, "_worked", 0)
-    assert not any(room.is_worth_compiling(1500) for _ in range(100))
-    assert not room.is_worth_compiling()
-    assert any(room.is_worth_compiling(1500) for _ in range(40))
-    monkeypatch.setattr(room, "_worked", 0)
+    assert not any(room.is_worth_compiling(room.AT_ONCE - 1) for _ in range(1000))
     assert room.is_worth_compiling(room.AT_ONCE)
-    assert room.is_worth_compiling()
+    assert not room.is_worth_compiling()
+    with room.problem_of(room.AT_ONCE):
+        assert room.is_worth_compiling()
+        assert room.is_worth_compiling(10)
+    assert not room.is_worth_compiling()
 
 
 @pytest.mark.parametrize("affinity", ["b1_b2", "before_distortion"])
