@@ -5,7 +5,7 @@
 
 The ratios of the last release stand in released.json. A ratio is how many times tankcal's seconds
 of processor a peer takes, both measured in turns, so it means something on another machine, too;
-that it was another one is told.
+that it was another one, or with other versions, is told.
 """
 
 import argparse
@@ -29,8 +29,12 @@ def ratios_of(results):
 
 def fallen(results, released):
     """Lines, one for each ratio that fell by more than a fifth."""
-    other = results["machine"]["processor"] != released["machine"]["processor"]
-    place = f" on another machine ({released['machine']['processor']})" if other else ""
+    here, there = results["machine"], released["machine"]
+    place = ""
+    if here["processor"] != there["processor"]:
+        place = f" on another machine ({there['processor']})"
+    if changed := sorted({*there["versions"].items()} - {*here["versions"].items()}):
+        place += f" with {', '.join(map(' '.join, changed))}"
     now = ratios_of(results)
     return [
         f"fell by {100 * (1 - now[name] / then):.0f} %: {name}: {now[name]:.3g} times, "

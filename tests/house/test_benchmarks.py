@@ -92,6 +92,9 @@ def test_guard_names_another_machine_and_leaves_out_what_was_not_measured():
     other = released_with(10.0) | {"machine": MACHINE | {"processor": "Q"}}
     (line,) = guard.fallen(results_of(row()), other)
     assert "another machine (Q)" in line
+    other["machine"] = MACHINE | {"versions": {"numpy": "1"}}
+    (line,) = guard.fallen(results_of(row()), other)
+    assert line.endswith("at 0.1.0 with numpy 1")
     assert guard.fallen(results_of(), other) == []
 
 
