@@ -443,6 +443,7 @@ def test_a_field_of_cells_has_the_volume_of_the_field_of_points(tmp_path, monkey
         f"{1e6 * (volumes[1] / volumes[0] - 1):.1f} {u[1] / u[0]:.3f}",
     )
     assert abs(volumes[1] - volumes[0]) < u[0]
+    assert cells.field.means.hidden_seams == pytest.approx(whole.field.means.hidden_seams, abs=1e-6)
     assert 0.8 < u[1] / u[0] < 1.5  # means tell less of narrow seams
 
 

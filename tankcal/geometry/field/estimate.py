@@ -301,9 +301,10 @@ class Functionals:
     @property
     def hidden_seams(self):
         """(f,) standard uncertainty by seams between the columns of points, of one sign in all."""
-        sites, radius_m = self._field.sites, self._field.nominal_m
+        sites = self._field.sites
+        points = sites.azimuth_rad if sites.points_rad is None else sites.points_rad
         at_points = self.weights[:, np.isfinite(sites.azimuth_rad)].sum(axis=1)
-        return hidden_seams_m(sites.azimuth_rad, radius_m) * at_points
+        return hidden_seams_m(points, self._field.nominal_m) * at_points
 
     def _with_component(self, index):
         """(f, n) covariance of the functionals with one component at the sites."""

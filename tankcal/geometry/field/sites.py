@@ -30,6 +30,8 @@ class Sites:
         Azimuths of the vertical welds of each course; (): not known.
     shared : ndarray, shape (n, s), optional
         Derivative of the radii by unknowns that courses share: the constant of a plumb line.
+    points_rad : ndarray, shape (p,), optional
+        Azimuths of the points that the sites are means of.
     """
 
     course: np.ndarray
@@ -39,6 +41,7 @@ class Sites:
     leans: np.ndarray
     welds_rad: tuple = ()
     shared: np.ndarray | None = None
+    points_rad: np.ndarray | None = None
 
     def __len__(self):
         return len(self.course)
