@@ -319,15 +319,16 @@ def _factors(job, wall, volume, features):
     """
     return (
         *wall.factors(job, features.weights),
-        *_of_the_unseen(wall, volume, features, _declared(job)),
+        *_of_the_unseen(wall, volume, features, _declared(job), scanned=bool(job.clouds)),
     )
 
 
-def _of_the_unseen(wall, volume, features, declared):
+def _of_the_unseen(wall, volume, features, declared, *, scanned):
     """A `Factor` of each kind of component that the survey did not see all of.
 
     What was declared, a barrel or a taper, is not counted again. Seams count as those that points
-    need not meet at least, for their readings cannot say that there are none.
+    need not meet at least, for their readings cannot say that there are none; those of a scan,
+    which are means of cells that leave nothing out, can.
     """
     amplitudes, top = wall.field.amplitudes, volume.weights_m([volume.height_m])[0]
     inflation, assumed, found = amplitudes.inflation(), amplitudes.assumed_share(), []
@@ -342,7 +343,7 @@ def _of_the_unseen(wall, volume, features, declared):
         if chosen:
             parts = [inflation[index] * features.unseen(index) for index in chosen]
             told = assumed[chosen]
-            if kind == "seams":
+            if kind == "seams" and not scanned:
                 parts.append(_of_hidden_seams(features, top, sum(parts)))
                 told = np.append(told, 1.0)
             sizes = np.maximum([top @ part @ top for part in parts], 1e-30)
