@@ -281,8 +281,10 @@ def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=Fa
         statistic = np.where(np.isnan(now), statistic, now)
         off = np.where(used & ~needed & ~np.isnan(now), now, 0.0)
         worst = off.max(initial=0.0)
-        share = np.round(off / worst, TIED) if worst else off
-        goes = (off > critical) & (share >= (1.0 if few else at_once))
+        share = np.round(off / worst, TIED) if worst > 0 else off
+        goes = (off > critical) & (share >= at_once)
+        if few:  # the first of the worst alone
+            goes &= np.arange(len(off)) == np.argmax(share)
         comes = np.zeros(len(now), dtype=bool)
         if goes.any():
             goes = goes if choose is None else choose(adjustment, goes, share)

@@ -175,3 +175,20 @@ def test_readings_that_control_each_other_alone_are_a_tie_on_every_machine(round
         start, tests, lambda used, goes, comes: used & ~goes, at_once=0.6, returns=0, choose=choose
     )
     assert found.adjustment.tolist() == [True, False, True, True]
+
+
+def test_of_a_tie_one_goes_where_both_would_be_too_many():
+    """Without both nothing is determined; the first goes, the second is kept for it."""
+    size = np.array([1.0, 20.0, 20.0 - 1e-12])
+
+    def tests(used):
+        return used, np.where(used[1] & used[2], size, 0.0), CRITICAL
+
+    def readjust(used, goes, comes):
+        if goes[1] and goes[2]:
+            raise SolutionError("nothing is left of that point")
+        return used & ~goes
+
+    found = snoop(np.ones(3, bool), tests, readjust, at_once=0.6, returns=0, keep=True)
+    assert found.adjustment.tolist() == [True, False, True]
+    assert not found.needed.any()
