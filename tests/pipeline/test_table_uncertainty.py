@@ -8,7 +8,16 @@ import pytest
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
-from uncertainty import SHARED, body_of, case_of, dense, installed_peers, table_of
+from uncertainty import (
+    SHARED,
+    Peer,
+    body_of,
+    case_of,
+    dense,
+    table_of,
+    with_gtc,
+    with_uncertainties,
+)
 
 
 @pytest.fixture(scope="module")
@@ -28,10 +37,11 @@ def test_every_row_is_j_c_j_of_the_plain_tank(case, figure):
     assert np.array_equal(expanded, k * u)
 
 
-@pytest.mark.parametrize("name", ["GTC", "uncertainties"])
-def test_another_program_finds_the_same(case, name):
-    pytest.importorskip(name)
-    peer = installed_peers(case)[name]
+@pytest.mark.parametrize(
+    ("name", "make"), [("GTC", with_gtc), ("uncertainties", with_uncertainties)]
+)
+def test_another_program_finds_the_same(case, name, make):
+    peer = Peer(make, pytest.importorskip(name), case)
     peer.table_s(0.5)
     rows = list(peer.found)
     volume, u, *_ = table_of(body_of(case), case.heights_m)

@@ -597,8 +597,11 @@ def test_plan_of_many_points_draws_weakest_ellipses(only, monkeypatch):
 def test_marks_of_many_points_are_one_picture(only, monkeypatch):
     """Words stay text, and what was set aside is no exception."""
     paper = Paper(only[1] / "record.json")
-    for row in paper.readings:
-        row["removed"] = row["kind"] == "image coordinate" and row["ids"][0] == "S7"
+    found = paper.record["adjustment"]["residuals"]
+    found["removed"] = [
+        kind == "image coordinate" and ids[0] == "S7"
+        for kind, ids in zip(found["kind"], found["ids"], strict=True)
+    ]
 
     def counted():
         figure = figures.photo_residuals(paper)
