@@ -121,6 +121,8 @@ def test_seams_hide_from_columns_alone():
     assert hidden_seams_m(even, 30.0) == pytest.approx(one_m / 4)
     assert hidden_seams_m(np.linspace(0, FULL_TURN, 500), 7.5) < 0.01 * one_m
     assert hidden_seams_m(np.array([np.nan]), 7.5) == 0.0
+    both_ends = np.append(even, [-1e-17, 1e-300])  # of a turn: -1e-17 % FULL_TURN is FULL_TURN
+    assert hidden_seams_m(both_ends, 7.5) == pytest.approx(hidden_seams_m(even, 7.5))
 
 
 WELDS = (np.array([0.5, 3.0]), np.array([1.0]), np.array([2.0]))
