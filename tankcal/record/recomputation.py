@@ -19,7 +19,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from tankcal.record.columns import Texts
+from tankcal.record.columns import NO_INTEGER, Texts
 from tankcal.record.long_tables import BY_COLUMNS, long_pairs
 from tankcal.record.making import record_of, record_of_adjustment
 
@@ -187,11 +187,11 @@ def compare_records(record, found):
         if key == FACTORS and worst is not None:
             worst = _of_factors(record["capacity"], found["capacity"], worst)
         compared.append((len(places), worst, changed))
-    of_tables = [_compare_columns(place, *pair) for place, pair in tables.items()]
+    same_version = record["tankcal"] == found["tankcal"]
+    of_tables = [_compare_columns(place, *pair, same_version) for place, pair in tables.items()]
     compared += [one for numbers, _ in of_tables for one in numbers]
     apart = [worst for _, worst, _ in compared if worst is not None]
     beyond = sorted((one for one in apart if one.relative > one.tolerance), key=_over, reverse=True)
-    same_version = record["tankcal"] == found["tankcal"]
     return Recomputation(
         made_by=_versions(record),
         computed_by=_versions(found),
@@ -267,10 +267,10 @@ def _of_factors(was, now, by_number):
     return max(found, key=_over, default=None)
 
 
-def _compare_columns(place, was, now):
+def _compare_columns(place, was, now, same_version):
     """What `compare_records` looks at of a long table, column by column.
 
-    was, now  `ArrayColumns`
+    was, now  `ArrayColumns`      same_version  whether both have all columns
 
     Returns the (count, NumberApart or None, how many differ) of each column of numbers, and the
     first (place, recorded, computed) of each column whose other values are not the same.
@@ -278,28 +278,50 @@ def _compare_columns(place, was, now):
     numbers, others = [], []
     if was.count != now.count:
         return numbers, [(f"{place}[]", str(was.count), str(now.count))]
-    for name, column in was.arrays.items():
+    for name in dict.fromkeys((*was, *now)):
         where = _places_of(place, name)
-        if isinstance(column, Texts) or column.dtype == bool:
-            pairs = enumerate(zip(was[name], now[name], strict=True))
-            others += [(where(row), _shown(one), _shown(two))
-                       for row, (one, two) in pairs if one != two][:1]  # fmt: skip
+        if name not in now.arrays:
+            others.append((where(0), _shown(was[name][0]), "-"))
             continue
-        one, two = (np.asarray(table.arrays[name], dtype=float) for table in (was, now))
-        is_number = np.isfinite(one)
-        if one.shape != two.shape or (is_number != np.isfinite(two)).any():
-            others.append((where(0), "null or a number", "otherwise"))
+        if name not in was.arrays:
+            others += [(where(0), "-", _shown(now[name][0]))] * same_version
             continue
-        one, two = np.where(is_number, one, 0.0), np.where(is_number, two, 0.0)
-        apart = np.abs(one - two)
-        worst = None
-        if apart.any():
-            most = np.unravel_index(np.argmax(apart), apart.shape)
-            relative = float(apart[most] / np.abs(one).max()) if one.any() else np.inf
-            spot = where(most[0]) + "".join(f"[{i}]" for i in most[1:])
-            worst = NumberApart(spot, float(one[most]), float(two[most]), relative, TOLERANCE)
-        numbers.append((int(is_number.sum()), worst, int(np.count_nonzero(apart))))
+        one, two = (_numbers_of(table.arrays[name]) for table in (was, now))
+        alike = one is not None and two is not None and one.shape == two.shape
+        if not alike or (np.isfinite(one) != np.isfinite(two)).any():
+            others += _first_other(where, was[name], now[name], alike)
+        if alike:
+            numbers.append(_compare_numbers(where, one, two))
     return numbers, others
+
+
+def _numbers_of(column):
+    """Numbers of a column, nan where it is null; None of texts and truths."""
+    if isinstance(column, Texts) or column.dtype == bool:
+        return None
+    return np.where(column == NO_INTEGER, np.nan, column)
+
+
+def _first_other(where, was, now, are_numbers):
+    """[(place, recorded, computed)] of the first values that differ, of numbers in being null."""
+    for row, (one, two) in enumerate(zip(was, now, strict=True)):
+        if ((one is None) != (two is None)) if are_numbers else one != two:
+            return [(where(row), _shown(one), _shown(two))]
+    return []
+
+
+def _compare_numbers(where, one, two):
+    """How many numbers a column has, the NumberApart of it or None, and how many differ."""
+    count, both = int(np.isfinite(one).sum()), np.isfinite(one) & np.isfinite(two)
+    one, two = np.where(both, one, 0.0), np.where(both, two, 0.0)
+    apart = np.abs(one - two)
+    if not apart.any():
+        return count, None, 0
+    most = np.unravel_index(np.argmax(apart), apart.shape)
+    relative = float(apart[most] / np.abs(one).max()) if one.any() else np.inf
+    spot = where(most[0]) + "".join(f"[{i}]" for i in most[1:])
+    worst = NumberApart(spot, float(one[most]), float(two[most]), relative, TOLERANCE)
+    return count, worst, int(np.count_nonzero(apart))
 
 
 def _places_of(place, name):

@@ -62,8 +62,9 @@ def problem_of(rows):
 def is_worth_compiling(rows=0):
     """Whether compiled loops are to be used.
 
-    It hangs on the size of the problem alone, never on what was done before: compiled loops and
-    arrays differ in the last digits, and the same job is to give the same ones.
+    It hangs on the size of the problem, never on what this process did before: compiled loops and
+    arrays differ in the last digits, and the same job is to give the same ones. Loops that lie
+    beside the package count, however they came there: a large problem leaves its own.
 
     Parameters
     ----------

@@ -81,10 +81,10 @@ class Rows:
                 return np.inf
             for batch in part.batches:
                 add_rows(batch, batch.of(part.w), batch.of(part.jac), self.normals)
-            if self.weighing is None:
-                weighing += np.count_nonzero(part.jac.any(axis=2))
-        if self.weighing is None:
-            self.weighing = int(weighing)
+            if self.weighing != self.count:
+                weighing += int(np.count_nonzero(part.jac.any(axis=2)))
+        if self.weighing != self.count:  # a row may have none at the start alone
+            self.weighing = weighing
         return cost if np.isfinite(cost) else np.inf
 
     def evaluate(self, state):

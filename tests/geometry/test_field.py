@@ -24,6 +24,7 @@ from tankcal.geometry.field.misfit import Misfit
 from tankcal.geometry.field.sites import Sites
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall_straps import _joined
 
 FULL_TURN, RADIUS_M = 2 * np.pi, 6.5
 
@@ -121,6 +122,8 @@ def test_seams_hide_from_columns_alone():
     assert hidden_seams_m(even, 30.0) == pytest.approx(one_m / 4)
     assert hidden_seams_m(np.linspace(0, FULL_TURN, 500), 7.5) < 0.01 * one_m
     assert hidden_seams_m(np.array([np.nan]), 7.5) == 0.0
+    both_ends = np.append(even, [-1e-17, 1e-300])  # of a turn: -1e-17 % FULL_TURN is FULL_TURN
+    assert hidden_seams_m(both_ends, 7.5) == pytest.approx(hidden_seams_m(even, 7.5))
 
 
 WELDS = (np.array([0.5, 3.0]), np.array([1.0]), np.array([2.0]))
@@ -418,6 +421,22 @@ def test_cells_are_means_that_lose_nothing_of_a_circle():
     assert means.sum(axis=1) == pytest.approx(1.0)
     assert np.array_equal(np.unique(fewer.course), [0, 1])
     assert means @ (5.0 + 0.1 * sites.zeta) == pytest.approx(5.0 + 0.1 * fewer.zeta)
+
+
+def test_seams_hide_from_points_of_cells_beside_straps_as_from_points():
+    """Property: 2600 points in cells, straps beside them: what the points meet stays what it is."""
+    columns = FULL_TURN * np.arange(130) / 130
+    course, zeta = np.repeat([0, 1], 10), np.tile(np.linspace(-0.9, 0.9, 10), 2)
+    points = Sites(
+        course=np.repeat(course, 130), ring=np.repeat(np.arange(20), 130),
+        zeta=np.repeat(zeta, 130), azimuth_rad=np.tile(columns, 20), leans=np.zeros(2600, bool),
+    )  # fmt: skip
+    cells = sites_of_cells(points, cells_of(points, np.full(2600, 1e-6), 7.5, 400))
+    around = np.full(2, np.nan)
+    straps = Sites(np.arange(2), np.full(2, -1), np.zeros(2), around, np.zeros(2, bool))
+    found = hidden_seams_m(_joined(cells, straps).seen_rad, 7.5)
+    assert found == pytest.approx(hidden_seams_m(columns, 7.5))
+    assert hidden_seams_m(cells.azimuth_rad, 7.5) > 2 * found
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from scipy.stats import qmc
 from tankcal.gum.monte_carlo.sobol import COORDINATES, sobol_points
 
 
-@pytest.mark.parametrize("inputs", [1, 2, 15, COORDINATES, COORDINATES + 1])
+@pytest.mark.parametrize("inputs", [0, 1, 2, 15, COORDINATES, COORDINATES + 1])
 def test_points_are_those_of_scipy(inputs):
     """Another program: direction numbers, scrambling and order, bit by bit."""
     seed = np.random.SeedSequence(7).spawn(1)[0].generate_state(1)[0]

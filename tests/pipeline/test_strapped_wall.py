@@ -477,9 +477,13 @@ def test_what_a_master_lacks_is_told_of_the_master(tmp_path):
     tape = parts.registers["instruments"]["T-12"] | {"expansion_per_k": 1.15e-5}
     master = tape | {"certified_temperature_c": None, "expansion_per_k": None}
     master = {key: value for key, value in master.items() if value is not None}
-    parts.registers["instruments"] |= {"T-12": tape | {"master": "M"}, "M": master}
+    working = tape | {"master": "M"}
+    parts.registers["instruments"] |= {"T-12": working, "T-13": working, "M": master}
+    header, *rows = parts.tables["circumferences"]
+    named = [[*row, ("T-12", "T-13")[i % 2]] for i, row in enumerate(rows)]
+    parts.tables["circumferences"] = [[*header, "instrument"], *named]
     with pytest.raises(InputError) as refused:
         tankcal.load(write_folder(tmp_path, parts))
-    places = {one.column for one in refused.value.problems}
-    assert "M.certified_temperature_c" in places
+    places = [one.column for one in refused.value.problems]
+    assert places.count("M.certified_temperature_c") == 1
     assert "T-12.certified_temperature_c" not in places

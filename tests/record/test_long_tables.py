@@ -247,6 +247,32 @@ def test_long_tables_are_compared_number_by_number(survey, few_rows, monkeypatch
     assert [one[0] for one in found.otherwise] == ["adjustment.residuals.kind[0]"]
 
 
+@pytest.mark.parametrize(
+    ("was", "now"),
+    [
+        ([None, 2, 3, 4], [None, 2, 3, 5]),
+        ([None, None, None, None], [None, None, "a", None]),
+        ([None, None, None, None], [None, None, [1.0, 2.0], None]),
+        ([1.0, 2.0, None, 4.0], [1.0, 2.0, 3.0, 4.1]),
+        (None, [1, 2, 3, 4]),
+        (["a", None, "b", "c"], None),
+    ],
+)
+def test_columns_that_are_not_alike_are_told_as_those_of_lists(was, now, monkeypatch):
+    """Second method: the same tables as lists; nulls are no numbers, nor a column an error."""
+    made = {"tankcal": "1", "versions": {}}
+    of = [{"x": [1.0] * 4} | ({} if one is None else {"y": one}) for one in (was, now)]
+    one, two = (made | {"adjustment": {"residuals": table}} for table in of)
+    expected = compare_records(one, two)
+    monkeypatch.setattr(columns, "MOST_ROWS", 3)
+    found = compare_records(one, two)
+    assert not found.agrees
+    assert (found.largest, found.beyond) == (expected.largest, expected.beyond)
+    assert {told[0] for told in found.otherwise} <= {told[0] for told in expected.otherwise}
+    if was is not None and now is not None:
+        assert found.numbers == expected.numbers
+
+
 def test_texts_of_a_file_are_looked_at():
     with pytest.raises(ValueError, match="texts"):
         long_tables._texts(np.array([0, 2]), ["a", "b"])

@@ -17,6 +17,7 @@ from tankcal.adjust import noncentrality
 from tankcal.camera.model import CONVENTIONS, Form
 from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import rotation_of_angles
+from tankcal.solver import Group, Model, solve
 from tankcal.solver.compiled import compile_functions
 from tankcal.survey.network import Instrument, adjust, snoop
 from tankcal.survey.network.datum import directions
@@ -127,6 +128,26 @@ def test_loops_and_arrays_agree(make, compiler, monkeypatch):
     )
     for one, other in zip(first.residuals, second.residuals, strict=True):
         assert other.w == pytest.approx(one.w, abs=1e-5)
+
+
+@pytest.mark.parametrize("start_m", [0.0, 0.9])
+def test_rows_count_that_say_something_at_the_minimum(start_m):
+    """Two slopes of 10 m in plan do not feel a height of 0 at the start, but where it ends."""
+    height_m = np.sqrt(10.05**2 - 10**2)
+
+    def slopes(z, w, jac):
+        slope = np.hypot(10.0, z[0])
+        w[:] = (slope - 10.05) / 0.001
+        jac[:] = z[0] / slope / 0.001
+
+    def level(z, w, jac):
+        w[:] = (z[0] - height_m) / 0.01
+        jac[:] = 1 / 0.01
+
+    groups = Group(np.zeros((2, 1), int), 1, slopes), Group(np.zeros((1, 1), int), 1, level)
+    found = solve(Model(1, 0, groups, np.add), np.array([start_m]))
+    assert (found.rows, found.dof) == (3, 2)
+    assert found.unknowns == pytest.approx(height_m, abs=1e-9)
 
 
 def test_rows_in_parts_give_what_all_of_them_give(survey, adjusted, monkeypatch):

@@ -29,6 +29,7 @@ WELD_LENGTH_M = 0.2  # the same of a peak at a weld, which is 0.8 m wide in all
 JOINT_LENGTH = 0.2  # of half a course: how far a joint draws the plate in
 LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
 HIDDEN_M, HIDDEN_PART, HIDDEN_WIDTH_M = 0.040, 0.0053, 0.8  # depth, of the radius at most; width
+SAME_RAD = 1e-9  # azimuths that differ by rounding alone
 BELL, BELL_SD = 1.0, 0.4  # of the way from a parabola to a plate whose joints do not turn
 
 _LEVEL = (1,)
@@ -266,6 +267,7 @@ def hidden_seams_m(azimuth_rad, radius_m):
     if not len(around):
         return 0.0
     apart = np.diff(around, append=around[0] + FULL_TURN)
+    apart = apart[apart > SAME_RAD]  # the end of a turn may stand beside its start
     ratio = np.maximum(HIDDEN_WIDTH_M / (radius_m * apart), 1 + 1e-9)
     parts = 2 * np.sinc(ratio) / (1 - ratio**2)
     area = min(HIDDEN_M, HIDDEN_PART * radius_m) * HIDDEN_WIDTH_M / 2

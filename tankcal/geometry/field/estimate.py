@@ -302,9 +302,8 @@ class Functionals:
     def hidden_seams(self):
         """(f,) standard uncertainty by seams between the columns of points, of one sign in all."""
         sites = self._field.sites
-        points = sites.azimuth_rad if sites.points_rad is None else sites.points_rad
         at_points = self.weights[:, np.isfinite(sites.azimuth_rad)].sum(axis=1)
-        return hidden_seams_m(points, self._field.nominal_m) * at_points
+        return hidden_seams_m(sites.seen_rad, self._field.nominal_m) * at_points
 
     def _with_component(self, index):
         """(f, n) covariance of the functionals with one component at the sites."""

@@ -59,6 +59,11 @@ class Sites:
             shared=None if self.shared is None else self.shared[chosen],
         )
 
+    @property
+    def seen_rad(self):
+        """Azimuths of the points themselves, where the sites are means of some."""
+        return self.azimuth_rad if self.points_rad is None else self.points_rad
+
     def welds_of(self, course):
         """Azimuths of the vertical welds of a course."""
         return self.welds_rad[course] if self.welds_rad else np.zeros(0)

@@ -66,7 +66,7 @@ def _directions(inputs):
     lines = Path(__file__).with_name("joe_kuo.txt").read_text("ascii").splitlines()
     rows = [[int(one) for one in line.split()] for line in lines if not line.startswith("#")]
     numbers = np.array([_continued(*row) for row in rows[:inputs]], dtype=np.int64)
-    digits = numbers[:, None, :] >> np.arange(BITS - 1, -1, -1)[:, None]
+    digits = numbers.reshape(inputs, 1, BITS) >> np.arange(BITS - 1, -1, -1)[:, None]
     return (digits & 1).astype(float)
 
 
