@@ -332,5 +332,5 @@ def _joined(points, straps):
     return Sites(
         **{name: np.concatenate([getattr(points, name), getattr(straps, name)]) for name in names},
         welds_rad=points.welds_rad,
-        points_rad=np.concatenate([points.seen_rad, straps.seen_rad]),
+        points=tuple(np.concatenate(pair) for pair in zip(points.seen, straps.seen, strict=True)),
     )

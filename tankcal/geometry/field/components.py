@@ -28,8 +28,6 @@ SEAM_LENGTH_M = 0.4  # along the arc, of a seam's flank
 WELD_LENGTH_M = 0.2  # the same of a peak at a weld, which is 0.8 m wide in all
 JOINT_LENGTH = 0.2  # of half a course: how far a joint draws the plate in
 LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
-HIDDEN_M, HIDDEN_PART, HIDDEN_WIDTH_M = 0.040, 0.0053, 0.8  # depth, of the radius at most; width
-SAME_RAD = 1e-9  # azimuths that differ by rounding alone
 BELL, BELL_SD = 1.0, 0.4  # of the way from a parabola to a plate whose joints do not turn
 
 _LEVEL = (1,)
@@ -234,44 +232,6 @@ def weld_columns(azimuth_rad, welds_rad, radius_m):
     """(n, w) a seam of WELD_LENGTH_M at each weld, of peak one: c(a - weld); 0 of a whole turn."""
     away = np.subtract.outer(azimuth_rad, welds_rad)
     return np.nan_to_num(seam_correlation(away, radius_m, WELD_LENGTH_M))
-
-
-def hidden_seams_m(azimuth_rad, radius_m):
-    """Standard uncertainty of a mean radius by two seams that points need not meet, m.
-
-    Both run up the whole shell, of the depth d and the width w, cos^2 across. Columns of points s
-    apart take each, at a random place between them, for its area A = d w / 2 times 1 + q cos phi,
-
-        q = 2 sinc(w / s) / (1 - (w / s)^2),
-
-    so two make an error of the standard deviation q A. Where s > w a seam may be missed altogether:
-    q = 1. Of seams that points do meet the readings tell. Gaps count by their share of the turn.
-
-    Parameters
-    ----------
-    azimuth_rad : ndarray, shape (n,)
-        Of the points, in all courses; nan: a whole turn, which misses nothing.
-    radius_m : float
-        Of the tank, m.
-
-    Returns
-    -------
-    float
-
-    Examples
-    --------
-    >>> round(1e3 * hidden_seams_m(np.arange(72) * FULL_TURN / 72, 7.5), 2)
-    0.23
-    """
-    around = np.unique(azimuth_rad[np.isfinite(azimuth_rad)] % FULL_TURN)
-    if not len(around):
-        return 0.0
-    apart = np.diff(around, append=around[0] + FULL_TURN)
-    apart = apart[apart > SAME_RAD]  # the end of a turn may stand beside its start
-    ratio = np.maximum(HIDDEN_WIDTH_M / (radius_m * apart), 1 + 1e-9)
-    parts = 2 * np.sinc(ratio) / (1 - ratio**2)
-    area = min(HIDDEN_M, HIDDEN_PART * radius_m) * HIDDEN_WIDTH_M / 2
-    return area / (FULL_TURN * radius_m) * float(np.sqrt(parts**2 @ apart / FULL_TURN))
 
 
 def mode_shares(modes, radius_m):

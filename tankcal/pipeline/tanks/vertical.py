@@ -355,9 +355,9 @@ def _of_the_unseen(wall, volume, features, declared, *, scanned):
 
 def _of_hidden_seams(features, top, known):
     """(f, f) covariance by which what is known of seams is short of those that points may miss."""
-    hidden = features.hidden_seams
-    least = max((top @ hidden) ** 2, 1e-30)
-    return max(1 - top @ known @ top / least, 0.0) * np.outer(hidden, hidden)
+    hidden = features.hidden_seams()
+    least = max(top @ hidden @ top, 1e-30)
+    return max(1 - top @ known @ top / least, 0.0) * hidden
 
 
 def _functionals(wall, volume):
