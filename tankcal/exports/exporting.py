@@ -96,7 +96,7 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
         With every reason why the profile cannot take the table.
     """
     path, log = Path(source), Log()
-    record = records.read(path)
+    record = records.read(path, tables=False)
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     _check_table(path.name, record, log)
     log.stop_if_problems()

@@ -102,7 +102,7 @@ def was_surveyed(record):
     """Whether anything of the tank was measured: not where all of its sizes were declared."""
     if record.job.tank.kind == "mesh":
         return True
-    return bool(record.points) or any(getattr(record, one) is not None for one in _SURVEYS)
+    return record.points != [] or any(getattr(record, one) is not None for one in _SURVEYS)
 
 
 def _tank(record):

@@ -5,13 +5,13 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.record.long_tables import attached, copy_record, split
+from tankcal.record.long_tables import attached, copy_record, split, without_tables
 from tankcal.record.plain_data import whole, without_collection
 from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
 
 __all__ = [
     "FORMAT", "VERSION", "copy_record", "load", "migrated", "read", "record_of",
-    "record_of_adjustment", "save", "version_of",
+    "record_of_adjustment", "save", "version_of", "whole",
 ]  # fmt: skip
 
 
@@ -97,7 +97,7 @@ def load(path):
     return attached(migrated(record, name), path)
 
 
-def read(path):
+def read(path, *, tables=True):
     """The record in a file with each part a dataclass.
 
     Parameters
@@ -105,6 +105,8 @@ def read(path):
     path : path
         Of a record.json; read("results/record.json").capacity.volume_m3[-1] is the volume at the
         top of the table.
+    tables : bool, default True
+        False: long tables, which stand in a file beside it, are None; that file is not needed.
 
     Returns
     -------
@@ -118,4 +120,6 @@ def read(path):
     from tankcal.record.making import Record
     from tankcal.record.schema import from_plain
 
-    return from_plain(Record, whole(load(path)), Path(path).name)
+    record = load(path)
+    record = whole(record) if tables else without_tables(record)
+    return from_plain(Record, record, Path(path).name)

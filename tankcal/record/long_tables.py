@@ -17,7 +17,14 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import list_some, message
-from tankcal.record.columns import ArrayColumns, ArrayRows, Texts, as_columns, is_long
+from tankcal.record.columns import (
+    NO_INTEGER,
+    ArrayColumns,
+    ArrayRows,
+    Texts,
+    as_columns,
+    is_long,
+)
 from tankcal.record.schema import Saved, key
 from tankcal.record.versions import RECORD
 
@@ -136,10 +143,10 @@ def attached(record, path):
     Raises
     ------
     InputError
-        In one line, when a table is neither in the record nor named.
+        In one line, when a table is neither in the record nor in FILE by its word.
     """
     said = record.get(KEY)
-    rows = said["rows"] if said else {}
+    rows = said["rows"] if said and said["file"] == FILE else {}
     places = [place for place in TABLES if _lacks(record, place)]
     missing = [place for place in places if place not in rows]
     if missing:
@@ -169,6 +176,12 @@ def problems_of_tables(record):
     except InputError as error:
         return error.problems
     return ()
+
+
+def without_tables(record):
+    """The record with None in place of its long tables: nothing is read for it."""
+    held = (ArrayColumns, ArrayRows)
+    return _with(record, {one: None for one in TABLES if isinstance(_at(record, one), held)})
 
 
 def long_pairs(record, other):
@@ -216,7 +229,7 @@ class _Beside:
 
     def __init__(self, record, said):
         self._record, self._said = record.name, said
-        self.path = record.with_name(Path(said["file"]).name)
+        self.path = record.with_name(FILE)
 
     @cached_property
     def tables(self):
@@ -287,14 +300,26 @@ _KINDS = {"number": "fi", "integer": "i", "boolean": "b"}  # of arrays
 def _fits(column, schema):
     """Whether a column holds what a key of the schema may be."""
     names = schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
+    is_text = isinstance(column, Texts)
+    array = column.codes if is_text else column
+    if array.dtype.itemsize > 8:  # longer numbers than those of Python
+        return False
     if "array" in names:
-        column = column.codes if isinstance(column, Texts) else column
-        return column.ndim > 1 and column.dtype.kind in "fib"
-    if isinstance(column, Texts):
-        return "string" in names and column.codes.ndim == 1
+        is_deep = array.ndim == 2 if is_text else array.ndim > 1
+        return is_deep and array.dtype.kind in "fib" and 0 not in array.shape[1:]
+    if array.ndim != 1 or ("null" not in names and _has_null(column)):
+        return False
+    if is_text:
+        return "string" in names
     kinds = "".join(_KINDS.get(one, "") for one in names)
-    is_null = "null" in names and column.dtype.kind == "f" and np.isnan(column).all()
-    return column.ndim == 1 and (is_null or column.dtype.kind in kinds)
+    is_null = "null" in names and array.dtype.kind == "f" and np.isnan(array).all()
+    return is_null or array.dtype.kind in kinds
+
+
+def _has_null(column):
+    if isinstance(column, Texts):
+        return bool((column.codes < 0).any())
+    return column.dtype.kind == "i" and bool((column == NO_INTEGER).any())
 
 
 # ---- places in a record

@@ -344,7 +344,7 @@ def _worst(key, places, found, rounding):
     )
     apart = np.abs(one - two)
     changed = int(np.count_nonzero(apart))
-    if key.startswith(DRAWN) or key.rstrip("[]").endswith(VOLUMES):
+    if DRAWN in key or key.rstrip("[]").endswith(VOLUMES):
         apart[apart <= rounding] = 0.0
     if not apart.any():
         return None, changed

@@ -136,6 +136,18 @@ def test_what_needs_no_long_table_needs_no_file(split, short):
         list(found["points"])
 
 
+def test_an_export_needs_no_file(split, tmp_path_factory):
+    """Second way: the file beside it."""
+    out = tmp_path_factory.mktemp("exports")
+    asked = ["export", str(split), "--profile", "csv", "--out"]
+    assert main([*asked, str(out / "with.csv")]) == 0
+    (split / FILE).unlink()
+    assert main([*asked, str(out / "without.csv")]) == 0
+    assert (out / "without.csv").read_bytes() == (out / "with.csv").read_bytes()
+    bare = read(split / "record.json", tables=False)
+    assert bare.points is bare.adjustment.points is bare.adjustment.residuals is None
+
+
 def spoilt(path, **arrays):
     """Put arrays into the file beside a record, which names it again."""
     with np.load(path / FILE) as held:
@@ -153,6 +165,10 @@ def spoilt(path, **arrays):
         (lambda path: spoilt(path, **{"points.x_m": np.zeros(3)}), f"{FILE}: does not hold the "),
         (lambda path: spoilt(path, **{"points.x_m": np.array(["x"] * 48)}), f"{FILE}: does not "),
         (lambda path: spoilt(path, **{"points.point": np.arange(99)}), f"{FILE}: does not hold "),
+        (
+            lambda path: spoilt(path, **{"points.x_m": np.zeros(48, np.longdouble)}),
+            f"{FILE}: does not hold ",
+        ),
     ],
 )
 def test_another_file_is_told_in_one_line(split, tmp_path_factory, capsys, spoil, line):
@@ -170,6 +186,28 @@ def test_a_record_that_names_no_file_is_told_in_one_line(split):
     (split / "record.json").write_text(json.dumps(record), encoding="utf-8")
     with pytest.raises(InputError, match=r"record\.json: without points, adjustment.points, "):
         load(split / "record.json")
+
+
+@pytest.mark.parametrize("name", ["", ".", "x.npz", "x" * 5000, "record.json"])
+def test_a_record_that_names_another_file_is_told_in_one_line(split, name):
+    record = json.loads((split / "record.json").read_bytes())
+    record["long_tables"]["file"] = name
+    (split / "record.json").write_text(json.dumps(record), encoding="utf-8")
+    with pytest.raises(InputError, match=r"record\.json: without points, adjustment.points, "):
+        load(split / "record.json")
+
+
+@pytest.mark.parametrize(
+    ("place", "null"),
+    [("points.point", -1), ("adjustment.residuals.file", -1)]
+    + [("adjustment.residuals.repeats", columns.NO_INTEGER)],
+)
+def test_null_is_no_value_where_a_short_record_has_none(split, place, null):
+    with np.load(split / FILE) as held:
+        column = held[place]
+    spoilt(split, **{place: np.where(np.arange(len(column)) == 3, null, column)})
+    with pytest.raises(InputError, match=rf"{FILE}: does not hold .*{place}"):
+        list(load(split / "record.json")["points"])
 
 
 # ---- a survey as it is run

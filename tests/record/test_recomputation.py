@@ -32,6 +32,7 @@ def record(factor, volumes=(0.0, 40.0, 500.0), drawn=0.0):
             "factor_m3": np.asarray(factor).tolist(),
         },
         "monte_carlo": {"se_value": [drawn, 0.0]},
+        "budgets": [{"monte_carlo": {"d_low": drawn}}],
     }
 
 

@@ -32,7 +32,7 @@ from tankcal.report.document import blocks_of
 from tankcal.report.notebook import execute, joined
 from tankcal.report.outputs.csv_files import write_csv
 from tankcal.report.paper import Paper
-from tankcal.report.survey import figures, readings, results, statistics
+from tankcal.report.survey import common, figures, readings, results, statistics
 from tankcal.survey import observations
 from tankcal.survey.results import Adjustment, GroupOfReadings
 from tankcal.text.words import load_words, verdict_sentences
@@ -455,6 +455,13 @@ def test_of_very_many_points_the_sheet_has_the_weakest(only, tmp_path, monkeypat
     trace = {row["point"]: np.trace(row["cov_m2"]) for row in record["points"]}
     assert set(names) == set(sorted(trace, key=lambda name: -trace[name])[:10])
     assert names == [row["point"] for row in record["points"] if row["point"] in names]
+
+
+def test_papers_send_nobody_to_a_sheet_that_is_cut(monkeypatch):
+    paper = SimpleNamespace(paragraph=lambda name, **_: name)
+    monkeypatch.setattr(common, "MOST_IN_SHEET", 10)
+    named = [common.with_note(paper, "table", [1], range(rows))[1] for rows in (10, 11)]
+    assert named == ["only_worst", "only_worst_of_many"]
 
 
 @pytest.mark.slow

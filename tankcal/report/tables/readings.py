@@ -8,6 +8,7 @@ from tankcal.report.tables.table import Column, Table
 from tankcal.text.digits import decimals_of, fixed, format_significant
 from tankcal.text.words import factor_text, group_name, observation_name
 
+MOST_IN_SHEET = 5_000  # readings, or points, of a survey in the workbook
 _JUDGED = ("as_declared", "better", "worse")
 
 

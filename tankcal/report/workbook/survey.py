@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.record.columns import as_columns
-from tankcal.report.tables.readings import GROUPS, READINGS, in_their_units
+from tankcal.report.tables.readings import GROUPS, MOST_IN_SHEET, READINGS, in_their_units
 from tankcal.report.tables.survey import (
     CHECK_POINTS,
     INSTRUMENTS,
@@ -26,8 +26,8 @@ from tankcal.text.words import (
     verdict_sentences,
 )
 
-MOST_READINGS = 5_000  # of the sheet: those with the largest |w|
-MOST_POINTS = 5_000  # of the sheet: those that were not used, then the weakest
+MOST_READINGS = MOST_IN_SHEET  # of the sheet: those with the largest |w|
+MOST_POINTS = MOST_IN_SHEET  # of the sheet: those that were not used, then the weakest
 _LEAST = (34, 12)  # widths of the first columns, where labels and values stand
 _HEAD_ROW = 3
 _MOST_ASIDE = 50  # sentences on points that were set aside
