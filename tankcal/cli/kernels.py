@@ -18,7 +18,7 @@ def main():
     """Compile what is not kept yet, and say what is; the exit status."""
     os.environ["TANKCAL_COMPILED"] = "1"
     from tankcal.exports.breakpoints import best_breakpoints, fewest_breakpoints
-    from tankcal.solver.compiled import are_kept, available
+    from tankcal.solver.compiled import available, mark_as_kept
     from tankcal.survey.network import adjust
 
     if not available():
@@ -33,7 +33,7 @@ def main():
     fewest_breakpoints(height_m, volume_m3, 0.1)
     package = Path(__file__).parents[1]
     kept = sorted(package.glob("**/__pycache__/*.nbc"))
-    if not are_kept():
+    if not mark_as_kept():
         print(f"{package} may not be written to: compiled loops were not kept", file=sys.stderr)
         return 1
     print(f"{len(kept)} compiled loops are kept in {package}")

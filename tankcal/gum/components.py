@@ -21,6 +21,7 @@ import numpy as np
 from tankcal.gum.coverage import coverage_factor, dof_of, least_of, sum_of_fourths
 
 BLOCK = 1024  # rows at once: copies of them stay in the processor's cache
+NO_EIGENVALUE = 1e-12  # of the largest: what rounding leaves where there is none is below it
 ROUNDING = 1e-12  # of the largest volume of a table: less than that is lost in its digits
 
 
@@ -174,7 +175,7 @@ def factor_of(covariance):
     largest = max(values.max(initial=0.0), 0.0)
     if values.min(initial=0.0) < -1e-9 * largest:
         raise ValueError(f"not a covariance: eigenvalue {values.min():.3g} against {largest:.3g}")
-    keep = values > 1e-14 * largest
+    keep = values > NO_EIGENVALUE * largest
     return (vectors[:, keep] * np.sqrt(values[keep]))[:, ::-1]
 
 

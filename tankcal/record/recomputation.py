@@ -26,7 +26,10 @@ from tankcal.record.making import record_of, record_of_adjustment
 TABLE, TABLE_TOLERANCE, TOLERANCE = "capacity.", 1e-9, 1e-6
 FACTORS, DRAWN, VOLUMES = "capacity.factor_m3[][]", "monte_carlo.", "_m3"
 ROUNDING, PROBES = 1e-14, 50  # of the largest volume; rows whose covariances with all are compared
-UNCOMPARED = ("format", "tankcal", "versions", "job.source")  # who computed, and where
+UNCOMPARED = (
+    "format", "tankcal", "versions", "job.source",  # who computed, and where
+    "interpolation.at_m", "proportional_parts.zones[].at_m",  # of maxima, flat ones; these are
+)  # fmt: skip
 WORDS = ("text", "words", "formula")  # of messages: a later version may say it otherwise
 
 

@@ -13,6 +13,7 @@ and fewer rows are enough where compiled loops lie beside the package, made at i
 TANKCAL_COMPILED=1 compiles at first use, 0 never.
 """
 
+import hashlib
 import importlib.util
 import os
 from contextlib import contextmanager
@@ -40,10 +41,33 @@ def _asked_for():
     return os.environ.get("TANKCAL_COMPILED", "patient")
 
 
+_SOURCES = (Path(__file__).with_name("loops.py"), Path(__file__).parents[1] / "camera/imaging.py")
+_MARK = Path(__file__).parent / "__pycache__" / "kernels.txt"
+
+
+def _stamp():
+    return hashlib.sha256(b"".join(one.read_bytes() for one in _SOURCES)).hexdigest()
+
+
+def mark_as_kept():
+    """Say that compiled loops of these sources lie beside them; False where nothing is written."""
+    try:
+        _MARK.write_text(_stamp(), encoding="utf-8")
+    except OSError:
+        return False
+    return any(_MARK.parent.glob("loops._eliminate-*.nbi"))
+
+
 @cache
 def are_kept():
-    """True when compiled loops of the solver lie beside their source."""
-    return any(Path(__file__).parent.glob("__pycache__/loops._eliminate-*.nbi"))
+    """True when an installation has compiled the loops (`tankcal.cli.kernels`) as they are now.
+
+    What a large job left behind does not count, or a job would depend on those before it.
+    """
+    try:
+        return _MARK.read_text(encoding="utf-8") == _stamp()
+    except (OSError, UnicodeDecodeError):
+        return False
 
 
 _rows = ContextVar("rows of the problem at hand", default=0)

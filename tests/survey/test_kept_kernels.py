@@ -72,3 +72,17 @@ def test_less_work_is_enough_where_loops_are_kept(monkeypatch):
         monkeypatch.setattr(compiled, "are_kept", lambda kept=kept: kept)
         assert not compiled.is_worth_compiling(rows - 1)
         assert compiled.is_worth_compiling(rows)
+
+
+def test_what_a_large_job_left_behind_does_not_count(tmp_path, monkeypatch):
+    """Only an installation says so, and of these very sources."""
+    mark, are_kept = tmp_path / "kernels.txt", compiled.are_kept.__wrapped__
+    monkeypatch.setattr(compiled, "_MARK", mark)
+    (tmp_path / "loops._eliminate-1.py311.nbi").touch()
+    assert not are_kept()
+    assert compiled.mark_as_kept()
+    assert are_kept()
+    monkeypatch.setattr(compiled, "_SOURCES", compiled._SOURCES[:1])
+    assert not are_kept()
+    mark.write_bytes(b"\xff")
+    assert not are_kept()
