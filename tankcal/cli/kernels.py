@@ -11,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from tankcal.messages import message
+
 ROWS = 3000  # of the table: from here on a walk over its chords is compiled
 
 
@@ -22,7 +24,8 @@ def main():
     from tankcal.survey.network import adjust
 
     if not available():
-        print("numba is not installed: nothing to compile", file=sys.stderr)
+        text = message("kernels_no_numba", "numba is not installed: nothing to compile")
+        print(text, file=sys.stderr)
         return 1
     adjusted = adjust(small_survey())
     adjusted.residuals  # noqa: B018 (what it computes needs loops of its own)
@@ -34,9 +37,19 @@ def main():
     package = Path(__file__).parents[1]
     kept = sorted(package.glob("**/__pycache__/*.nbc"))
     if not mark_as_kept():
-        print(f"{package} may not be written to: compiled loops were not kept", file=sys.stderr)
+        text = message(
+            "kernels_not_kept",
+            "{folder} may not be written to: compiled loops were not kept",
+            folder=package,
+        )
+        print(text, file=sys.stderr)
         return 1
-    print(f"{len(kept)} compiled loops are kept in {package}")
+    text = message(
+        "kernels_kept",
+        "{count} compiled loops are kept in {folder}",
+        count=len(kept), folder=package,
+    )  # fmt: skip
+    print(text)
     return 0
 
 

@@ -332,5 +332,4 @@ def _joined(points, straps):
     return Sites(
         **{name: np.concatenate([getattr(points, name), getattr(straps, name)]) for name in names},
         welds_rad=points.welds_rad,
-        points=tuple(np.concatenate(pair) for pair in zip(points.seen, straps.seen, strict=True)),
     )

@@ -14,7 +14,6 @@ from generated_walls import job_of, survey
 
 from tankcal.geometry.columns import find_columns
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
-from tankcal.geometry.field.hidden_seams import hidden_seams_m
 from tankcal.geometry.shell import UNDECIDED
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.undecided_columns import factors_of_undecided
@@ -130,37 +129,6 @@ def test_seams_that_one_column_meets_are_within_u(shape, tmp_path, figure):
         off, expanded, _ = judged(wall, measured, tmp_path)
         figure(f"seams of 40 mm, {shape}, draw {seed}: ppm off, U", f"{off:.0f} {expanded:.0f}")
         assert abs(off) < expanded
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("shape", SHAPES)
-def test_seams_that_no_column_meets_are_within_u(shape, tmp_path, figure):
-    """40 mm, 0.8 m wide, both in the middle between columns 0.65 m apart, and so in no reading."""
-    apart = 2 * np.pi / 72
-    wall = wall_of([Seam(at * apart, -0.04, 0.8, shape) for at in (10.5, 37.5)])
-    measured = survey(np.random.default_rng(11), wall, rings=3, points=72, noise_m=0.0)
-    azimuth = (measured.azimuth_rad - measured.azimuth_rad[0]) % (2 * np.pi)
-    radius = wall.radius_at(measured.course, measured.zeta, azimuth)
-    radius += 1e-3 * np.random.default_rng(12).normal(size=len(radius))
-    measured = replace(measured, azimuth_rad=azimuth, radius_m=radius, noise_m=1e-3)
-    off, expanded, _ = judged(wall, measured, tmp_path)
-    figure(f"hidden seams of 40 mm, {shape}: ppm off, U", f"{off:.0f} {expanded:.0f}")
-    assert abs(off) < expanded
-
-
-def test_the_budget_has_seams_that_no_column_meets(tmp_path):
-    """Closed form: a smooth wall tells of no seam, and 0.23 mm of the mean radius are assumed."""
-    shape = wall_of([], courses=3)
-    measured = survey(np.random.default_rng(1), shape, rings=1, points=72, noise_m=1e-3)
-    job = job_of(shape, measured, tmp_path)
-    wall = find_wall(job, lambda text: None)
-    table, sources = total_of(job, wall)
-    seams = next(one for one in sources if one.kind == "seams")
-    hidden = hidden_seams_m(wall.field.sites.azimuth_rad, shape.radius_m)
-    assert hidden == pytest.approx(0.23e-3, abs=0.01e-3)
-    expected = 2 * table.volume_m3[0] * hidden / shape.radius_m
-    assert np.sqrt(np.sum(seams.columns_m3**2)) == pytest.approx(expected, rel=1e-3)
-    assert seams.note == "assumed"
 
 
 @pytest.mark.slow
