@@ -251,6 +251,8 @@ def main(chosen):
     for name in chosen:
         _, unit, small, large = CASES[name]
         found = {size: [] for size in small + (large if ROUNDS > 2 else ())}
+        if not found:
+            continue
         for number in range(ROUNDS):
             for size, runs in found.items():
                 if size in small or number < 2:
