@@ -12,9 +12,10 @@ PLAN = EXAMPLE.parent / "plan-silva"
 MEASURED_DAY = "2025-03-04"
 
 
-def changed_plan(folder, *pairs):
-    """The example's plan in `folder`, with texts of plan.toml replaced."""
-    for path in PLAN.iterdir():
+def changed_plan(folder, *pairs, source=PLAN):
+    """A shipped plan in `folder`, the example's or another, with texts of plan.toml replaced."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in source.iterdir():
         (folder / path.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
     text = (folder / "plan.toml").read_text(encoding="utf-8")
     for old, new in pairs:

@@ -4,6 +4,7 @@ import csv
 
 import numpy as np
 from conftest import EXAMPLE
+from plan_folders import changed_plan
 
 LINES, HITS, TANGENTS = (
     EXAMPLE.parent / f"plan-{name}" for name in ("reference-line", "wall-hits", "tangents")
@@ -12,16 +13,8 @@ BAR_M = 2.0
 
 
 def plan_of(folder, source=LINES, *pairs):
-    """The folder of a shipped plan, with texts of its plan.toml replaced."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for path in source.iterdir():
-        (folder / path.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
-    text = (folder / "plan.toml").read_text(encoding="utf-8")
-    for old, new in pairs:
-        assert old in text
-        text = text.replace(old, new)
-    (folder / "plan.toml").write_text(text, encoding="utf-8")
-    return folder
+    """The folder of a shipped plan of the bare wall, with texts of its plan.toml replaced."""
+    return changed_plan(folder, *pairs, source=source)
 
 
 def with_bar(folder, *pairs):
