@@ -142,7 +142,7 @@ def seen_excess(amplitudes, radius_m, rings):
     for number, sizes in enumerate(_drawn_sizes(amplitudes, rng)):
         outline = _outline(rng, sum(sizes[one] * spectra[one] for one in sizes), radius_m)
         found.append(_excess_of(known[number % len(known)].moved(outline, sizes, rng)))
-    sizes = _sizes_of(amplitudes.variances_m2)
+    sizes = _sizes_of(amplitudes.likely_m2)
     seen = [_excess_of(one.moved(np.full(nodes, radius_m), sizes)) for one in known]
     unseen = max(np.mean(found) - np.mean(seen), 0.0)
     return float(np.mean(found)), float(np.hypot(np.std(found, ddof=1), unseen))
@@ -216,7 +216,7 @@ def _drawn_sizes(amplitudes, rng):
     """Variances of "oval" and "seam" of DRAWS walls, as unsure as the amplitudes are, m2."""
     chosen = [i for i, one in enumerate(COMPONENTS) if one.shape in ("oval", "seam")]
     spread = amplitudes.log_covariance[np.ix_(chosen, chosen)]
-    logs = np.log(amplitudes.variances_m2[chosen])
+    logs = np.log(amplitudes.likely_m2[chosen])
     drawn = np.zeros((DRAWS, len(COMPONENTS)))
     drawn[:, chosen] = np.exp(rng.multivariate_normal(logs, spread, size=DRAWS, method="eigh"))
     return [_sizes_of(row) for row in drawn]

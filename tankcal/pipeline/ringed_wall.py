@@ -99,11 +99,10 @@ class RingFeatures:
 
     def _of_bulges(self):
         """A `Factor` of what the straps did not see of mean radii along the rings."""
-        amplitudes = self._wall.field.amplitudes
-        inflation, assumed = amplitudes.inflation(), amplitudes.assumed_share()
+        assumed = self._wall.field.amplitudes.assumed_share()
         chosen = [i for i, one in enumerate(COMPONENTS) if one.shape == "mean"]
         turn = self._of_levels
-        parts = [inflation[i] * turn @ self._means.unseen(i) @ turn.T for i in chosen]
+        parts = [turn @ self._means.unseen(i) @ turn.T for i in chosen]
         sizes = np.maximum([np.trace(part) for part in parts], 1e-30)
         known = told_by(float(sizes @ assumed[chosen] / sizes.sum()))
         by = "B" if known == "assumed" else "A"

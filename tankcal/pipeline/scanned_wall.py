@@ -169,12 +169,12 @@ def offsets(fit, xyz_m):
 
 def _of_the_unseen(field, found, rows):
     """A `Factor` of each kind of departure that the points did not see all of."""
-    inflation, assumed, factors = field.amplitudes.inflation(), field.amplitudes.assumed_share(), []
+    assumed, factors = field.amplitudes.assumed_share(), []
     for kind in KINDS:
         chosen = [i for i, one in enumerate(field.places.departures) if one.kind == kind]
         if not chosen:
             continue
-        parts = [inflation[i] * found.unseen[i][rows, rows] for i in chosen]
+        parts = [found.unseen[i][rows, rows] for i in chosen]
         sizes = np.maximum([np.trace(part) for part in parts], 1e-30)
         known = told_by(float(sizes @ assumed[chosen] / sizes.sum()))
         by = "B" if known == "assumed" else "A"

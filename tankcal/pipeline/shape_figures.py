@@ -195,10 +195,9 @@ class ShapeBase:
 
     def _unseen(self):
         """Covariance (f, f) of what was not seen of the wall, of each kind of component."""
-        inflation = self._wall.field.amplitudes.inflation()
         for kind in KINDS:
             chosen = [i for i, one in enumerate(COMPONENTS) if one.kind == kind]
-            yield sum(inflation[i] * self._found.unseen(i) for i in chosen)
+            yield sum(self._found.unseen(i) for i in chosen)
 
     def _causes(self):
         """`Source`s of what the survey leaves uncertain, and of what was declared."""

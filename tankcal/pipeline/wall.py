@@ -257,7 +257,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     is_read = is_read or (
         job.radii is not None and len({one.course for one in groups}) < len(job.courses)
     )
-    if is_read or job.points.unbound or by_inputs:
+    if is_read or job.points.unbound or by_inputs or job.tangents is not None:
         unbound = unbound_of(job.points, by_points, accepted)
         noise = by_points @ (covariance @ by_points.T)  # between sections, too
         noise = noise.toarray() if scipy.sparse.issparse(noise) else noise
@@ -369,7 +369,7 @@ def _blocks(samples):
 def _form_m2(amplitudes):
     """Amplitude of k^-3 that has all departures from a circle: what smooths an outline."""
     chosen = [one.shape in ("oval", "seam") for one in COMPONENTS]
-    return float(np.sum(amplitudes.variances_m2[chosen])) / np.sum(OVALITY_MODES**-3)
+    return float(np.sum(amplitudes.likely_m2[chosen])) / np.sum(OVALITY_MODES**-3)
 
 
 def _radii_by_points(sections, count):

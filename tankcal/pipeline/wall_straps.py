@@ -59,7 +59,7 @@ def area_term(shape_sd_m, amplitudes, nominal_m, points=None):
     is_declared = shape_sd_m is not None
     if not is_declared:
         waves = [one.shape in ("oval", "seam") for one in COMPONENTS]
-        shape_sd_m = float(np.sqrt(amplitudes.variances_m2[waves].sum()))
+        shape_sd_m = float(np.sqrt(amplitudes.likely_m2[waves].sum()))
     if is_declared or points is None:
         return AreaTerm(*perimeter_excess(shape_sd_m, nominal_m)), shape_sd_m
     return AreaTerm(*seen_excess(amplitudes, nominal_m, _rings_of(points))), shape_sd_m
@@ -332,4 +332,5 @@ def _joined(points, straps):
     return Sites(
         **{name: np.concatenate([getattr(points, name), getattr(straps, name)]) for name in names},
         welds_rad=points.welds_rad,
+        points=tuple(np.concatenate(pair) for pair in zip(points.seen, straps.seen, strict=True)),
     )

@@ -14,14 +14,17 @@ from tankcal.geometry.field.components import (
     COMPONENTS,
     azimuth_correlations,
     joint_profile,
+    plate_profiles,
     seam_correlation,
 )
 from tankcal.geometry.field.estimate import LEVELS, WallField, gauss_heights
 from tankcal.geometry.field.evidence import likelihood_of
+from tankcal.geometry.field.hidden_seams import hidden_covariance_m2, hidden_seams_m
 from tankcal.geometry.field.misfit import Misfit
 from tankcal.geometry.field.sites import Sites
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall_straps import _joined
 
 FULL_TURN, RADIUS_M = 2 * np.pi, 6.5
 
@@ -87,6 +90,72 @@ def test_a_component_of_unit_variance_has_unit_rms(one):
 def test_the_profile_of_joints_has_no_mean():
     node, weight = np.polynomial.legendre.leggauss(400)
     assert weight @ joint_profile(node) == pytest.approx(0.0, abs=1e-4)
+
+
+def test_a_plate_bulges_between_a_parabola_and_a_bell():
+    """Closed form: (1 - z^2)^2 with joints that do not turn, and 0.4 of the way to 1 - z^2."""
+    z = np.linspace(-1, 1, 41)
+    bell, turned = plate_profiles(z).T
+    expected = (1 - z**2) ** 2 - 8 / 15
+    assert bell / bell[20] == pytest.approx(expected / expected[20])
+    assert turned / bell[20] == pytest.approx(0.4 * (expected - (1 / 3 - z**2)) / expected[20])
+
+
+@pytest.mark.parametrize("columns", [60, 66, 72, 80])
+def test_seams_between_columns_are_those_of_random_places(columns):
+    """Simulation: two seams of 20 mm, cos^2 over 0.8 m, at all places between even columns."""
+    radius_m, apart_m = 7.5, FULL_TURN * 7.5 / columns
+    away = np.arange(-3, 4)[:, None] * apart_m + np.linspace(0, apart_m, 400, endpoint=False)
+    seen = np.sum(0.020 * np.cos(np.pi / 0.8 * np.clip(away, -0.4, 0.4)) ** 2, axis=0) * apart_m
+    scatter = np.sqrt(2 * np.mean((seen - 0.020 * 0.4) ** 2)) / (FULL_TURN * radius_m)
+    azimuth = FULL_TURN * np.arange(columns) / columns
+    found = hidden_seams_m(azimuth, radius_m)
+    assert found == pytest.approx(scatter, rel=0.06)  # the second harmonic is left out
+
+
+def test_seams_hide_from_columns_alone():
+    """Properties: as large as a seam at most, and nothing where points are dense or tapes lie."""
+    even = FULL_TURN * np.arange(24) / 24
+    one_m = 0.020 * 0.4 / (FULL_TURN * 7.5)
+    assert hidden_seams_m(even, 7.5) == pytest.approx(0.99 * one_m, rel=0.02)
+    assert hidden_seams_m(np.tile(even + 1.0, 3), 7.5) == pytest.approx(hidden_seams_m(even, 7.5))
+    assert hidden_seams_m(even, 30.0) == pytest.approx(one_m / 4)
+    assert hidden_seams_m(np.linspace(0, FULL_TURN, 500), 7.5) < 0.01 * one_m
+    assert hidden_seams_m(np.array([np.nan]), 7.5) == 0.0
+    both_ends = np.append(even, [-1e-17, 1e-300])  # of a turn: -1e-17 % FULL_TURN is FULL_TURN
+    assert hidden_seams_m(both_ends, 7.5) == pytest.approx(hidden_seams_m(even, 7.5))
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.2, 0.5])
+def test_courses_err_alike_as_far_as_their_columns_do(turned):
+    """Simulation: two seams at 40 000 random places, seen by two courses of 60 columns."""
+    radius_m, apart = 7.5, FULL_TURN / 60
+    azimuth = np.concatenate([np.arange(60) * apart, (np.arange(60) + turned) * apart])
+    course = np.repeat([0, 1], 60)
+    seam = np.random.default_rng(1).uniform(0, FULL_TURN, (2, 40_000))
+
+    def mean_m(of):
+        away = radius_m * ((azimuth[course == of] - seam[:, :, None] + np.pi) % FULL_TURN - np.pi)
+        return np.mean(0.02 * np.cos(np.pi / 0.8 * np.clip(away, -0.4, 0.4)) ** 2, -1).sum(0)
+
+    expected = np.cov(mean_m(0), mean_m(1))
+    found = hidden_covariance_m2(course, azimuth, radius_m)
+    assert found == pytest.approx(expected, abs=0.06 * expected[0, 0])
+    assert found == pytest.approx(found.T)
+    one_m = hidden_seams_m(azimuth[:60], radius_m)
+    assert np.sqrt(np.diag(found)) == pytest.approx(one_m)
+
+
+def test_a_dense_ring_helps_its_own_course_alone():
+    """24 columns in three courses, and 300 points more in one of them."""
+    even, dense = FULL_TURN * np.arange(24) / 24, FULL_TURN * np.arange(300) / 300
+    found = hidden_covariance_m2(
+        np.repeat([0, 1, 2, 0], [24, 24, 24, 300]), np.concatenate([*[even] * 3, dense + 1e-3]), 7.5
+    )
+    size = np.sqrt(np.diag(found))
+    assert size[0] < 0.02 * size[1]
+    assert size[1:] == pytest.approx(hidden_seams_m(even, 7.5))
+    assert found[1, 2] == pytest.approx(found[1, 1])
 
 
 WELDS = (np.array([0.5, 3.0]), np.array([1.0]), np.array([2.0]))
@@ -367,7 +436,10 @@ def test_what_a_plan_says_of_the_ovality_is_not_unsure():
     sizes = dict(zip(names, np.sqrt(known.variances_m2), strict=True))
     assert sizes["common ovality"] == pytest.approx(0.006)
     assert sizes["own ovality"] == pytest.approx(0.008)
-    assert known.inflation()[names.index("own ovality")] == 1.0
+    assert (
+        known.variances_m2[names.index("own ovality")]
+        == known.likely_m2[names.index("own ovality")]
+    )
     assert isinstance(known, Amplitudes)
 
 
@@ -384,6 +456,26 @@ def test_cells_are_means_that_lose_nothing_of_a_circle():
     assert means.sum(axis=1) == pytest.approx(1.0)
     assert np.array_equal(np.unique(fewer.course), [0, 1])
     assert means @ (5.0 + 0.1 * sites.zeta) == pytest.approx(5.0 + 0.1 * fewer.zeta)
+
+
+def test_seams_hide_from_points_of_cells_beside_straps_as_from_points():
+    """Property: 2600 points in cells, straps beside them: what the points meet stays what it is."""
+    columns = FULL_TURN * np.arange(130) / 130
+    course, zeta = np.repeat([0, 1], 10), np.tile(np.linspace(-0.9, 0.9, 10), 2)
+    points = Sites(
+        course=np.repeat(course, 130), ring=np.repeat(np.arange(20), 130),
+        zeta=np.repeat(zeta, 130), azimuth_rad=np.tile(columns, 20), leans=np.zeros(2600, bool),
+    )  # fmt: skip
+    cells = sites_of_cells(points, cells_of(points, np.full(2600, 1e-6), 7.5, 400))
+    around = np.full(2, np.nan)
+    straps = Sites(np.arange(2), np.full(2, -1), np.zeros(2), around, np.zeros(2, bool))
+    course, azimuth = _joined(cells, straps).seen
+    found = hidden_seams_m(azimuth[course == 0], 7.5)
+    assert found == pytest.approx(hidden_seams_m(columns, 7.5))
+    assert hidden_seams_m(cells.azimuth_rad[cells.course == 0], 7.5) > 2 * found
+    upper = _joined(cells, straps).take(np.flatnonzero(_joined(cells, straps).course == 1)).points
+    assert np.array_equal(np.unique(upper[0]), [0])
+    assert hidden_seams_m(upper[1], 7.5) == pytest.approx(found)
 
 
 @pytest.mark.slow
@@ -409,6 +501,8 @@ def test_a_field_of_cells_has_the_volume_of_the_field_of_points(tmp_path, monkey
         f"{1e6 * (volumes[1] / volumes[0] - 1):.1f} {u[1] / u[0]:.3f}",
     )
     assert abs(volumes[1] - volumes[0]) < u[0]
+    hidden = [one.field.means.hidden_seams() for one in (whole, cells)]
+    assert hidden[1] == pytest.approx(hidden[0], abs=1e-2 * hidden[0].max())
     assert 0.8 < u[1] / u[0] < 1.5  # means tell less of narrow seams
 
 

@@ -60,7 +60,7 @@ def some_sites(seed=4, courses=3, points=9):
 def test_covariances_are_the_sum_of_the_components():
     """Second method: each component written out by itself."""
     sites = some_sites()
-    variances = assumed_amplitudes().variances_m2
+    variances = assumed_amplitudes().likely_m2
     total = Covariances(sites, RADIUS_M).total(variances)
     assert total == pytest.approx(written_out(sites, variances), rel=1e-9, abs=1e-15)
 
@@ -183,7 +183,7 @@ def test_half_an_inverse_tests_as_the_whole_one():
     """Second method: P written out; of readings that alone tell a centre, too."""
     sites = some_sites()
     design, size = free_design(sites)[0], len(sites)
-    whole = written_out(sites, assumed_amplitudes().variances_m2) + 1e-6 * np.eye(size)
+    whole = written_out(sites, assumed_amplitudes().likely_m2) + 1e-6 * np.eye(size)
     radius = 0.004 * np.random.default_rng(2).normal(size=size)
     other = restricted_precision(whole.copy(), design)
     half = Precision(whole.copy(), design)
@@ -200,7 +200,7 @@ def test_a_departure_is_from_the_wall_that_all_others_show():
     """Second method: each reading left out, and predicted by the others' own normal equations."""
     sites = some_sites()
     radius = RADIUS_M + 0.004 * np.random.default_rng(2).normal(size=len(sites))
-    field = written_out(sites, assumed_amplitudes().variances_m2)
+    field = written_out(sites, assumed_amplitudes().likely_m2)
     whole = field + 1e-6 * np.eye(len(sites))
     design = free_design(sites)[0]
     accepted = np.ones(len(sites), dtype=bool)
@@ -281,7 +281,7 @@ def test_points_of_a_course_that_was_set_aside_are_compared_with_each_other():
     rng = np.random.default_rng(9)
     sites = sites_of(3, [-0.5, 0.5], 12, rng)
     gone = sites.course == 1
-    covariance = Covariances(sites, RADIUS_M).total(assumed_amplitudes().variances_m2)
+    covariance = Covariances(sites, RADIUS_M).total(assumed_amplitudes().likely_m2)
     covariance.flat[:: len(sites) + 1] += 1e-6
     precision = restricted_precision(covariance, free_design(sites)[0])
     radius = 1e-3 * rng.normal(size=len(sites))

@@ -207,7 +207,7 @@ def test_sizes_are_as_unsure_as_they_are_said(estimated, figure):
         distance, design = drawn(rng, places, np.exp(logs), 1e-3)
         noise = np.eye(100) * (1.0 if estimated else 1e-6)
         sizes = estimate_sizes(places, design, distance, noise, estimate_noise=estimated)
-        away.append((np.log(sizes.variances_m2) - logs) / np.sqrt(np.diag(sizes.log_covariance)))
+        away.append((np.log(sizes.likely_m2) - logs) / np.sqrt(np.diag(sizes.log_covariance)))
         assert np.isfinite(sizes.noise_dof) == estimated
     away = np.array(away)
     rms = np.sqrt(np.mean(away**2, axis=0))

@@ -24,7 +24,7 @@ POINTS, NOISE_M = 24, 1e-3
 def test_the_jump_is_an_unknown_more_in_the_adjustment():
     """Second method: generalised least squares with the jump as a column of the design."""
     rng, sites = np.random.default_rng(2), sites_of(3, [-0.5, 0.5], 12)
-    covariance = Covariances(sites, RADIUS_M).total(assumed_amplitudes().variances_m2)
+    covariance = Covariances(sites, RADIUS_M).total(assumed_amplitudes().likely_m2)
     covariance.flat[:: len(sites) + 1] += NOISE_M**2
     column = np.flatnonzero(np.isclose(sites.azimuth_rad, FULL_TURN / 4))
     aside, design = np.array([0, 7]), free_design(sites)[0]

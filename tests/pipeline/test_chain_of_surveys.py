@@ -148,7 +148,7 @@ def test_the_variances_of_the_causes_add_up_to_the_unsplit_one(job, survey):
     whole = run(replace(job, measurements=with_control(survey)))
     points = replace(whole.job.points, causes=())
     unsplit = run(replace(job, points=points))
-    assert whole.table.u_m3 == pytest.approx(unsplit.table.u_m3, rel=1e-10)
+    assert whole.table.u_m3 == pytest.approx(unsplit.table.u_m3, rel=2e-9)
     assert whole.table.volume_m3 == pytest.approx(unsplit.table.volume_m3, rel=1e-14)
     scale = next(s for s in whole.table.sources if s.kind == "instrument_scale")
     assert (scale.u, scale.unit, scale.note, scale.type) == (
@@ -206,7 +206,7 @@ def test_the_volume_does_not_know_which_photo_is_held(job, survey, figure):
     figure("volume and u of points, whichever of 8 photos is held: largest relative change", apart)
     figure("largest sd of a coordinate, inner and 8 photos held, mm", np.round(1e3 * np.array(sds)))
     # the heights of the rings in their courses move with the frame, by millimetres
-    assert np.all(apart < [2e-8, 1e-6])
+    assert np.all(apart < [2e-8, 1e-5])
     assert max(sds) > 2 * min(sds)
 
 

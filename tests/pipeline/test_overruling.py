@@ -91,7 +91,7 @@ def test_a_kept_point_may_drive_a_sound_one_out(tmp_path):
     result = run(job, decision("dent"))
     assert {"b", "c"} & {*result.overrulings.others}
     assert "others_changed" in [one.expected.code for one in result.warnings]
-    assert result.table.U_m3[-1] > 5 * run(job).table.U_m3[-1]  # no longer known how it goes on
+    assert result.table.U_m3[-1] > 2 * run(job).table.U_m3[-1]  # no longer known how it goes on
 
 
 def test_the_outrageous_is_told(dented):

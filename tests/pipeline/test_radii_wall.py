@@ -46,7 +46,7 @@ def test_u_at_the_joints_is_that_of_the_radii(tmp_path):
     girths = 2 * np.pi * np.array(RADII_M) * HEIGHTS_M
     own = np.sqrt(np.cumsum((0.3e-3 * girths) ** 2))
     assert_allclose(table.u_m3[rows], np.hypot(0.7e-3 * np.cumsum(girths), own), rtol=1e-9)
-    assert table.u_m3[rows[0] // 2] > 1.2 * np.hypot(0.7e-3, 0.3e-3) * girths[0] / 2  # between
+    assert table.u_m3[rows[0] // 2] > 1.1 * np.hypot(0.7e-3, 0.3e-3) * girths[0] / 2  # between
 
 
 def test_declared_departures_stand_in_place_of_the_assumed(tmp_path):

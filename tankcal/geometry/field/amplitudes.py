@@ -20,7 +20,8 @@ class Amplitudes:
 
     Attributes
     ----------
-    variances_m2 : ndarray, shape (components,)
+    likely_m2 : ndarray, shape (components,)
+        The most likely variances.
     log_covariance : ndarray, shape (components, components)
         Of the logarithms of the variances.
     prior_log_sd : ndarray, shape (components,)
@@ -31,7 +32,7 @@ class Amplitudes:
         Standard deviation of the logarithm of that factor.
     """
 
-    variances_m2: np.ndarray
+    likely_m2: np.ndarray
     log_covariance: np.ndarray
     prior_log_sd: np.ndarray
     noise: float = 1.0
@@ -48,13 +49,15 @@ class Amplitudes:
         """
         return np.clip(np.diag(self.log_covariance) / self.prior_log_sd**2, 0.0, 1.0)
 
-    def inflation(self):
-        """(components,) mean of each variance over its most likely value, exp(s^2 / 2).
+    @property
+    def variances_m2(self):
+        """(components,) mean of each variance: its most likely value times exp(s^2 / 2).
 
-        A normal distribution whose variance is log-normal has the variance of that mean, and holds
-        95 % within 1.96 to 2.06 of its standard deviations for s up to 1.5.
+        A wall whose sizes are unsure has this covariance, so weights by it make the best linear
+        estimate, and a further reading never widens its doubt. A normal distribution whose variance
+        is log-normal holds 95 % within 1.96 to 2.06 of its standard deviations for s up to 1.5.
         """
-        return np.exp(np.diag(self.log_covariance) / 2)
+        return self.likely_m2 * np.exp(np.diag(self.log_covariance) / 2)
 
 
 def assumed_amplitudes(ovality_m=None, common_ovality_m=None):

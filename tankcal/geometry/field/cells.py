@@ -80,4 +80,5 @@ def sites_of_cells(sites, weights):
         azimuth_rad=np.angle(turn) % FULL_TURN,
         leans=sites.leans[first],
         welds_rad=sites.welds_rad,
+        points=(sites.course, sites.azimuth_rad),
     )

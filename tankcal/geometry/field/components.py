@@ -28,6 +28,7 @@ SEAM_LENGTH_M = 0.4  # along the arc, of a seam's flank
 WELD_LENGTH_M = 0.2  # the same of a peak at a weld, which is 0.8 m wide in all
 JOINT_LENGTH = 0.2  # of half a course: how far a joint draws the plate in
 LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
+BELL, BELL_SD = 1.0, 0.4  # of the way from a parabola to a plate whose joints do not turn
 
 _LEVEL = (1,)
 KINDS = ("bulge", "ovality", "seams")
@@ -52,9 +53,9 @@ class Component:
     common : bool
         The same in all courses.
     orders : tuple of float, str
-        Variances of the Legendre polynomials 0, 1, ... in the height, up to a factor; "joints": the
-        profile exp(-(1 - |zeta|) / JOINT_LENGTH) less its mean; "local": the covariance
-        exp(-|zeta - zeta'| / LOCAL_LENGTH).
+        Variances of the Legendre polynomials 0, 1, ... in the height, up to a factor; "plate": of
+        the profiles of `plate_profiles`; "joints": the profile exp(-(1 - |zeta|) / JOINT_LENGTH)
+        less its mean; "local": the covariance exp(-|zeta - zeta'| / LOCAL_LENGTH).
     median_m, log_sd : float
         Median of its amplitude, m, and standard deviation of the logarithm of its variance.
     declared_as : str
@@ -74,6 +75,8 @@ class Component:
         """(n, r) columns whose products are h; not of a component that is local."""
         if self.orders == "joints":
             return joint_profile(zeta)[:, None]
+        if self.orders == "plate":
+            return plate_profiles(zeta)
         used, scale = self._scales
         return legendre(zeta, used[-1])[:, used] * scale
 
@@ -107,18 +110,17 @@ class Component:
         return self.height_columns(zeta) @ self.height_columns(other).T
 
 
-_EVEN = (0, 0, 1, 0, 0.1, 0, 0.02)  # barrels and drawn-in joints share their sign
 _FREE = (0, 0, *(order**-2.0 for order in range(2, 7)))
 _LINEAR = (0, 1)
 COMPONENTS = (
-    Component("common bulge", "bulge", "mean", True, _EVEN, 1.4e-3, 1.0, "barrel"),
-    Component("drawn-in joints", "bulge", "mean", True, "joints", 0.8e-3, 1.2, "barrel"),
+    Component("common bulge", "bulge", "mean", True, "plate", 1.0e-3, 1.0, "barrel"),
+    Component("drawn-in joints", "bulge", "mean", True, "joints", 0.8e-3, 1.0, "barrel"),
     Component("own bulge", "bulge", "mean", False, _FREE, 0.7e-3, 1.0, "barrel"),
-    Component("taper", "bulge", "mean", False, _LINEAR, 0.8e-3, 1.5, "taper"),
+    Component("taper", "bulge", "mean", False, _LINEAR, 0.35e-3, 1.2, "taper"),
     Component("common ovality", "ovality", "oval", True, _LEVEL, 4e-3, 2.0),
     Component("own ovality", "ovality", "oval", False, _LEVEL, 2e-3, 2.0),
     Component("turning ovality", "ovality", "oval", False, _LINEAR, 1e-3, 2.0),
-    Component("common seams", "seams", "seam", True, _LEVEL, 3e-3, 1.2),
+    Component("common seams", "seams", "seam", True, _LEVEL, 2.5e-3, 1.2),
     Component("own seams", "seams", "seam", False, _LEVEL, 2e-3, 1.2),
     Component("dents", "seams", "seam", False, "local", 2e-3, 1.2),
     Component("peaking", "seams", "weld", True, _LEVEL, 3e-3, 1.2),
@@ -134,6 +136,19 @@ def legendre(zeta, highest):
     for n in range(2, highest + 1):
         found[:, n] = (2 - 1 / n) * zeta * found[:, n - 1] - (1 - 1 / n) * found[:, n - 2]
     return found
+
+
+def plate_profiles(zeta):
+    """(n, 2) columns whose products are h of a plate that bulges between its joints.
+
+    A plate whose joints turn freely is nearly a parabola, p = 1 - zeta^2; one whose joints do not,
+    b = (1 - zeta^2)^2. What bulges is p + t (b - p), t about BELL with the standard deviation
+    BELL_SD. Less the mean over the course, p = -2/3 P2 and b = -16/21 P2 + 8/35 P4.
+    """
+    free, held = np.array([-2 / 3, 0.0]), np.array([-16 / 21, 8 / 35])  # of P2 and P4
+    shapes = np.array([free + BELL * (held - free), BELL_SD * (held - free)])
+    shapes /= np.sqrt(np.sum(shapes**2 @ [1 / 5, 1 / 9]))
+    return legendre(zeta, 4)[:, [2, 4]] @ shapes.T
 
 
 def joint_profile(zeta):

@@ -23,6 +23,7 @@ import scipy.linalg
 from tankcal.geometry.field.amplitudes import Amplitudes
 from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, weld_columns
 from tankcal.geometry.field.covariances import Covariances, without_rounding
+from tankcal.geometry.field.hidden_seams import hidden_covariance_m2
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
 from tankcal.geometry.field.sites import Sites, free_design
 from tankcal.geometry.outlines import FULL_TURN
@@ -292,6 +293,17 @@ class Functionals:
         size = self._field.amplitudes.variances_m2[index]
         spread = size * self._field._covariances.spread(self.weights, index)
         return without_rounding(self._within(index) - seen - seen.T + spread)
+
+    def hidden_seams(self):
+        """(f, f) covariance by seams between the columns of points of each course."""
+        sites = self._field.sites
+        covariance = hidden_covariance_m2(*sites.seen, self._field.nominal_m)
+        here, of_courses = (
+            np.isfinite(sites.azimuth_rad),
+            np.zeros((len(self.weights), len(covariance))),
+        )
+        np.add.at(of_courses, (slice(None), sites.course[here]), self.weights[:, here])
+        return of_courses @ covariance @ of_courses.T
 
     def _with_component(self, index):
         """(f, n) covariance of the functionals with one component at the sites."""

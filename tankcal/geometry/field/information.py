@@ -36,8 +36,11 @@ def expect_amplitudes(field):
         The same sizes, with the covariance of their logarithms after the survey.
     """
     amplitudes, covariances = field.amplitudes, Covariances(field.sites, field.nominal_m)
-    precision = restricted_precision(field.covariance_m2, free_design(field.sites)[0])
-    sizes = amplitudes.variances_m2
+    sizes = amplitudes.likely_m2
+    likely = replace(
+        field, amplitudes=replace(amplitudes, log_covariance=np.zeros(2 * sizes.shape))
+    )
+    precision = restricted_precision(likely.covariance_m2, free_design(field.sites)[0])
     shares = [
         precision @ covariances.total(size * (np.arange(len(sizes)) == i))
         for i, size in enumerate(sizes)

@@ -26,7 +26,7 @@ MOST_STEPS, LOG_STEP = 60, 0.7  # on to the very top; of a logarithm at once
 SMALL_STEP, ROUGH_STEP = 1e-7, 0.03  # of a logarithm, that end a search
 MIRRORED = 64  # rows at once
 NEAR_TOP = 1e-4  # of a logarithm: so near the top a change of the value is rounding
-AT_TOP = 2e-5  # of a logarithm: so near the top the curvature is that of the top
+AT_TOP = 1e-6  # of a logarithm: so near the top the curvature is that of the top
 
 
 @dataclass(frozen=True)

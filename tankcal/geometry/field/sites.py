@@ -30,6 +30,8 @@ class Sites:
         Azimuths of the vertical welds of each course; (): not known.
     shared : ndarray, shape (n, s), optional
         Derivative of the radii by unknowns that courses share: the constant of a plumb line.
+    points : tuple of ndarray, shape (p,), optional
+        Course and azimuth of the points that the sites are means of.
     """
 
     course: np.ndarray
@@ -39,6 +41,7 @@ class Sites:
     leans: np.ndarray
     welds_rad: tuple = ()
     shared: np.ndarray | None = None
+    points: tuple | None = None
 
     def __len__(self):
         return len(self.course)
@@ -54,7 +57,13 @@ class Sites:
             leans=self.leans[chosen],
             welds_rad=tuple(self.welds_of(one) for one in seen) if self.welds_rad else (),
             shared=None if self.shared is None else self.shared[chosen],
+            points=None if self.points is None else _of_courses(*self.points, seen),
         )
+
+    @property
+    def seen(self):
+        """Course and azimuth of the points themselves, where the sites are means of some."""
+        return self.points or (self.course, self.azimuth_rad)
 
     def welds_of(self, course):
         """Azimuths of the vertical welds of a course."""
@@ -108,3 +117,9 @@ def distinct_azimuths(azimuth_rad):
     turns = np.round((np.asarray(azimuth_rad) % FULL_TURN) / SAME_AZIMUTH_RAD)
     found, place = np.unique(turns, return_inverse=True)
     return place, found * SAME_AZIMUTH_RAD
+
+
+def _of_courses(course, azimuth_rad, seen):
+    """Course, by its place among those that are seen, and azimuth of the points in these."""
+    here = np.isin(course, seen)
+    return np.searchsorted(seen, course[here]), azimuth_rad[here]

@@ -319,17 +319,19 @@ def _factors(job, wall, volume, features):
     """
     return (
         *wall.factors(job, features.weights),
-        *_of_the_unseen(wall, volume, features, _declared(job)),
+        *_of_the_unseen(wall, volume, features, _declared(job), scanned=bool(job.clouds)),
     )
 
 
-def _of_the_unseen(wall, volume, features, declared):
+def _of_the_unseen(wall, volume, features, declared, *, scanned):
     """A `Factor` of each kind of component that the survey did not see all of.
 
-    What was declared, a barrel or a taper, is not counted again.
+    What was declared, a barrel or a taper, is not counted again. Seams count as those that points
+    need not meet at least, for their readings cannot say that there are none; those of a scan,
+    which are means of cells that leave nothing out, can.
     """
     amplitudes, top = wall.field.amplitudes, volume.weights_m([volume.height_m])[0]
-    inflation, assumed, found = amplitudes.inflation(), amplitudes.assumed_share(), []
+    assumed, found = amplitudes.assumed_share(), []
     for kind in KINDS:
         chosen = [
             index
@@ -339,12 +341,23 @@ def _of_the_unseen(wall, volume, features, declared):
             and (one.shape == "mean" or wall.field.stated)
         ]
         if chosen:
-            parts = [inflation[index] * features.unseen(index) for index in chosen]
+            parts = [features.unseen(index) for index in chosen]
+            told = assumed[chosen]
+            if kind == "seams" and not scanned:
+                parts.append(_of_hidden_seams(features, top, sum(parts)))
+                told = np.append(told, 1.0)
             sizes = np.maximum([top @ part @ top for part in parts], 1e-30)
-            known = told_by(float(sizes @ assumed[chosen] / sizes.sum()))
+            known = told_by(float(sizes @ told / sizes.sum()))
             by = "B" if known == "assumed" else "A"
             found.append(Factor(kind, factor_of(sum(parts)), type=by, note=known))
     return tuple(one for one in found if one.columns.shape[1])
+
+
+def _of_hidden_seams(features, top, known):
+    """(f, f) covariance by which what is known of seams is short of those that points may miss."""
+    hidden = features.hidden_seams()
+    least = max(top @ hidden @ top, 1e-30)
+    return max(1 - top @ known @ top / least, 0.0) * hidden
 
 
 def _functionals(wall, volume):

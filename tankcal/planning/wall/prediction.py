@@ -195,7 +195,7 @@ def foresee_table(job, amplitudes):
     found = find_survey(job, lambda text: None, amplitudes)
     if found.survey is None or isinstance(found.survey, NominalWall):
         return _tabled(found, found.survey)  # nothing is read that could tell amplitudes
-    field = found.survey.field  # how well sizes are known changes no weight of a reading
+    field = found.survey.field
     expected = expect_amplitudes(field)
     if found.touching is not None:  # but how far a hull stands out
         found = find_survey(job, lambda text: None, expected)
@@ -218,10 +218,7 @@ def courses_of(tabled):
     courses = len(job.courses)
     mean = np.kron(np.eye(courses), panels([0.0, 1.0], LEVELS)[1])
     weights = mean @ field.means.weights
-    sizes = field.amplitudes.inflation()
-    covariance = sum(
-        sizes[i] * mean @ field.means.unseen(i) @ mean.T for i in range(len(COMPONENTS))
-    )
+    covariance = sum(mean @ field.means.unseen(i) @ mean.T for i in range(len(COMPONENTS)))
     wall = tabled.wall
     noise = field.noise_m2 if isinstance(wall, StrappedWall) else noise_of_wall(wall)
     sds = np.sqrt(np.diag(covariance) + np.einsum("ij,jk,ik->i", weights, noise, weights))

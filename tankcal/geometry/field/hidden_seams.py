@@ -1,0 +1,100 @@
+"""What seams that no column of points meets leave uncertain of the mean radii of the courses.
+
+Two narrow seams run up the whole shell, of the depth d and the width w, cos^2 across, at random
+places. Columns of points s apart take each for its area A = d w / 2 times 1 + q cos phi,
+
+    q = 2 sinc(w / s) / (1 - (w / s)^2),
+
+phi by its place between them, so two make an error of the standard deviation q A. Where s > w a
+seam may be missed altogether: q = 1. Of seams that points do meet the readings tell.
+
+A course is seen by its own columns. Where those of two courses stand one above another, both err
+alike; elsewhere as far as the columns, passed through a seam, vary alike with its place.
+"""
+
+import numpy as np
+
+from tankcal.geometry.outlines import FULL_TURN
+
+DEPTH_M, PART, WIDTH_M = 0.020, 0.00265, 0.8  # of a seam; depth as a part of the radius at most
+SAME_RAD = 1e-9  # azimuths that differ by rounding alone
+PLACES = 2**14  # round the shell, at which the columns of two courses are compared
+
+
+def hidden_covariance_m2(course, azimuth_rad, radius_m):
+    """Covariance of the mean radii of courses by seams that their points need not meet.
+
+    Parameters
+    ----------
+    course : ndarray of int, shape (n,)
+        Of each point: 0, 1, ...
+    azimuth_rad : ndarray, shape (n,)
+        nan: a whole turn, which misses nothing.
+    radius_m : float
+        Of the tank, m.
+
+    Returns
+    -------
+    ndarray, shape (courses, courses)
+        m2.
+
+    Examples
+    --------
+    >>> around = np.arange(24) * FULL_TURN / 24
+    >>> course = np.repeat([0, 1, 2], 24)
+    >>> turned = np.concatenate([around, around, around + FULL_TURN / 48])
+    >>> covariance = hidden_covariance_m2(course, turned, 7.5)
+    >>> np.round(covariance / covariance[0, 0], 3)
+    array([[ 1.   ,  1.   , -0.373],
+           [ 1.   ,  1.   , -0.373],
+           [-0.373, -0.373,  1.   ]])
+    """
+    courses = range(int(course.max(initial=-1)) + 1)
+    columns = [_columns(azimuth_rad[course == one]) for one in courses]
+    size = np.array([_size_m(apart, radius_m) for _, apart in columns])
+    place = np.arange(1, PLACES // 2 + 1) * WIDTH_M / (FULL_TURN * radius_m)
+    passed = np.array([np.fft.rfft(_shares(*one))[1:] for one in columns]) * _seam(place)
+    passed /= np.maximum(np.linalg.norm(passed, axis=1, keepdims=True), 1e-30)
+    return np.outer(size, size) * (passed @ passed.conj().T).real
+
+
+def hidden_seams_m(azimuth_rad, radius_m):
+    """Standard uncertainty of the mean radius of a course by seams its points need not meet, m.
+
+    Gaps count by their share of the turn.
+
+    Examples
+    --------
+    >>> round(1e3 * hidden_seams_m(np.arange(72) * FULL_TURN / 72, 7.5), 2)
+    0.11
+    """
+    return _size_m(_columns(azimuth_rad)[1], radius_m)
+
+
+def _columns(azimuth_rad):
+    """Azimuths of columns, ascending, and what parts each from the next."""
+    around = np.unique(azimuth_rad[np.isfinite(azimuth_rad)] % FULL_TURN)
+    apart = np.diff(around, append=around[:1] + FULL_TURN)
+    once = apart > SAME_RAD  # the end of a turn may stand beside its start
+    return around[once], apart[once]
+
+
+def _size_m(apart, radius_m):
+    if not len(apart):
+        return 0.0
+    parts = 2 * _seam(np.maximum(WIDTH_M / (radius_m * apart), 1.0))
+    area = min(DEPTH_M, PART * radius_m) * WIDTH_M / 2
+    return area / (FULL_TURN * radius_m) * float(np.sqrt(parts**2 @ apart / FULL_TURN))
+
+
+def _seam(ratio):
+    """What passes through cos^2 of the width w, of a wave that is w / ratio long."""
+    ratio = np.where(np.abs(ratio - 1) < 1e-9, 1 + 1e-9, ratio)
+    return np.sinc(ratio) / (1 - ratio**2)
+
+
+def _shares(around, apart):
+    """(PLACES,) the share of the turn that each column of points stands for, at its place."""
+    share = (apart + np.roll(apart, 1)) / (2 * FULL_TURN)
+    place = np.rint(around / FULL_TURN * PLACES).astype(int) % PLACES
+    return np.bincount(place, share, PLACES)
