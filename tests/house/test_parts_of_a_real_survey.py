@@ -85,7 +85,7 @@ def test_halves_agree_within_their_u(survey, figure):
     """E_n of one half against the other: rms of 2 E_n is 1 where U is right."""
     rng, count = np.random.default_rng(1), len(survey.job.points.names)
     en = []
-    for _ in range(draws(13, 26)):
+    for _ in range(draws(13, 78)):
         half = rng.permutation(count) < count // 2
         (one, one_u), (other, other_u) = survey.table_of(half), survey.table_of(~half)
         en.append((one - other) / np.hypot(one_u, other_u))
