@@ -161,6 +161,12 @@ def _simulated(prediction, options, show):
     return simulate(prediction, options.simulate, options.seed, options.blunders, show.part)
 
 
+def _bases(count):
+    if count == 1:
+        return message("plan_base", "{count} base of a stadia", count=count)
+    return message("plan_bases", "{count} bases of a stadia", count=count)
+
+
 def _summary(prediction):
     """What was planned, and how well points will be known."""
     from tankcal.planning.bases import by_ends
@@ -171,7 +177,7 @@ def _summary(prediction):
         message("plan_photographs", "{count} photographs", count=len(plan.photos)),
         planned_setups(len(plan.setups)),
         message("plan_ties", "{count} ties", count=len(plan.ties)),
-        message("plan_bases", "{count} bases of a stadia", count=len(by_ends(plan.bases))),
+        _bases(len(by_ends(plan.bases))),
         message("plan_control", "{count} control points", count=len(plan.known)),
         message("plan_targets", "{count} targets", count=len(plan.targets.names)),
     ]

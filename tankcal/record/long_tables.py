@@ -5,9 +5,11 @@ They are read when somebody asks for them, and held against the SHA-256 then: wh
 them needs no such file.
 """
 
+import errno
 import hashlib
 import io
 import json
+import os
 import shutil
 import zipfile
 from functools import cached_property
@@ -253,6 +255,8 @@ class _Beside:
 
     def _content(self):
         try:
+            if self.path.exists() and not self.path.is_file():  # a pipe would be waited for
+                raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
             content = self.path.read_bytes()
         except OSError as error:
             text = message(

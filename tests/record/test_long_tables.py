@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import os
 import shutil
 
 import numpy as np
@@ -148,6 +149,11 @@ def test_an_export_needs_no_file(split, tmp_path_factory):
     assert bare.points is bare.adjustment.points is bare.adjustment.residuals is None
 
 
+def replaced_by_a_pipe(path):
+    (path / FILE).unlink()
+    os.mkfifo(path / FILE)
+
+
 def spoilt(path, **arrays):
     """Put arrays into the file beside a record, which names it again."""
     with np.load(path / FILE) as held:
@@ -161,6 +167,7 @@ def spoilt(path, **arrays):
     ("spoil", "line"),
     [
         (lambda path: (path / FILE).unlink(), f"{FILE}: cannot be read (No such file"),
+        (replaced_by_a_pipe, f"{FILE}: cannot be read (Invalid argument)"),
         (lambda path: (path / FILE).write_bytes(b"x"), f"{FILE}: was altered: its SHA-256 is "),
         (lambda path: spoilt(path, **{"points.x_m": np.zeros(3)}), f"{FILE}: does not hold the "),
         (lambda path: spoilt(path, **{"points.x_m": np.array(["x"] * 48)}), f"{FILE}: does not "),
