@@ -28,6 +28,7 @@ from tankcal.geometry.seams import find_seams
 from tankcal.messages import message
 
 WIDE_BAND, WALL_BAND = 0.03, 0.01  # of the nominal radius: start, and largest believed deviation
+LEAST_BAND_M = 0.08  # that deviation at least: buckles and ovalities of small tanks are as deep
 END_TOLERANCE_M = 0.020  # a point this far above or below the shell still belongs to its edge
 SAMPLES = 1000  # three-point circles tried; with half the points clutter one in eight is sound
 BELIEVED_M = 0.013  # from the smooth form: what departs less is left to the field to judge
@@ -394,12 +395,16 @@ def _circles_through(triples):
 
 
 def _leaning_cylinder(local, course, candidates, circle, nominal_radius):
-    """Mask of the wall and axis (x, y, dx/dz, dy/dz), the band narrowing from 3 % to 1 % of R."""
+    """Mask of the wall and axis (x, y, dx/dz, dy/dz), the band narrowing from 3 % to 1 % of R or
+    LEAST_BAND_M.
+    """
     axis = np.array([circle[0], circle[1], 0.0, 0.0])
     distance = distances_from_axis(local, axis)[1]
-    wall = candidates & (np.abs(distance - circle[2]) < WIDE_BAND * nominal_radius)
+    least = max(WALL_BAND * nominal_radius, LEAST_BAND_M)
+    widest = max(WIDE_BAND * nominal_radius, least)
+    wall = candidates & (np.abs(distance - circle[2]) < widest)
     fitted = ~wall
-    for band in np.repeat(np.geomspace(WIDE_BAND, WALL_BAND, 5), 3) * nominal_radius:
+    for band in np.repeat(np.geomspace(widest, least, 5), 3):
         if np.any(fitted != wall):  # else the same points give the same axis, and the same radii
             rough, fitted = np.full(wall.sum(), 0.01), wall
             fit = adjust(*shell_problem(local[wall], course[wall], axis, rough, None, WIDEST_SLOPE))
