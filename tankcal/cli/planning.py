@@ -163,7 +163,7 @@ def _simulated(prediction, options, show):
 
 def _bases(count):
     if count == 1:
-        return message("plan_base", "{count} base of a stadia", count=count)
+        return message("plan_one_base", "{count} base of a stadia", count=count)
     return message("plan_bases", "{count} bases of a stadia", count=count)
 
 
