@@ -298,10 +298,8 @@ class Functionals:
         """(f, f) covariance by seams between the columns of points of each course."""
         sites = self._field.sites
         covariance = hidden_covariance_m2(*sites.seen, self._field.nominal_m)
-        here, of_courses = (
-            np.isfinite(sites.azimuth_rad),
-            np.zeros((len(self.weights), len(covariance))),
-        )
+        here = np.isfinite(sites.azimuth_rad)
+        of_courses = np.zeros((len(self.weights), len(covariance)))
         np.add.at(of_courses, (slice(None), sites.course[here]), self.weights[:, here])
         return of_courses @ covariance @ of_courses.T
 
