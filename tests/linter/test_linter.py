@@ -860,7 +860,11 @@ def test_cells_of_a_workbook(tmp_path):
         ("t.xls", b"\xd0\xcf\x11\xe0" + b"\0" * 600, "old .xls"),
         ("t.json", b"{", "not a record of tankcal"),
         ("t.json", b'{"format": "tankcal-record/1", "capacity": {}}', "not a record of tankcal"),
-        ("t.json", b'{"format": "tankcal-record/1"}', "t.json, capacity: a record of points without"),
+        (
+            "t.json",
+            b'{"format": "tankcal-record/1"}',
+            "t.json, capacity: a record of points without",
+        ),
         ("t.json", b"[" * 100_000, "not a record of tankcal"),
     ],
 )

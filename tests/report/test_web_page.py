@@ -236,7 +236,7 @@ def test_rows_are_found_by_dip_or_number(browser, report):
     assert browser.run(texts) == [f"4.2{n}0" for n in range(10)]
     browser.type(".finder input", "4.235")  # between two rows
     assert browser.run(texts) == ["4.230", "4.240"]
-    browser.type(".finder input", "624.704")
+    browser.type(".finder input", "624.705")
     assert browser.run(texts) == ["4.750"]
     browser.type(".finder input", "north")
     assert browser.text(".finder output") == "No row has north."
