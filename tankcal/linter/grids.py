@@ -115,22 +115,20 @@ def _workbook(file, data, log):
 
 
 def _record(file, text, log):
-    is_ours = is_of_points = False
     try:
         record = json.loads(text)
         is_ours = version_of(record) is not None
-        is_of_points = is_ours and record.get("capacity") is None
+        if is_ours and record.get("capacity") is None:
+            expected = message(
+                "lint_record_of_points",
+                "a record of points without a table; expected the record of a tank",
+            )
+            log.problem(file, expected, None, "capacity")
+            return ()
         table = record["capacity"]
         columns = [list(table[key]) for key in ("height_m", "volume_m3")]
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         is_ours = False
-    if is_of_points:
-        expected = message(
-            "lint_record_of_points",
-            "a record of points without a table; expected the record of a tank",
-        )
-        log.problem(file, expected, None, "capacity")
-        return ()
     if not is_ours:
         log.problem(
             file,

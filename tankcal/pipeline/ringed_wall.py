@@ -17,14 +17,13 @@ from tankcal.geometry.field.estimate import LEVELS, gauss_heights
 from tankcal.geometry.girth import perimeter_excess
 from tankcal.messages import message
 from tankcal.pipeline.strapped_wall import TapedWall, adjust_readings
-from tankcal.pipeline.tanks.common import told_by
+from tankcal.pipeline.tanks.common import factor_of_unseen
 from tankcal.pipeline.wall_readings import names_of, readings_of_straps
 from tankcal.pipeline.wall_straps import AreaTerm, gauged_plates
 from tankcal.quadrature import panels
 from tankcal.survey.strapping import reduce_straps, tapes_used
 from tankcal.tank.factors import Factor
 from tankcal.tank.rings import WAVES
-from tankcal.uncertainty import factor_of
 
 FLATTENED = 0.5  # of the variance round a ring: by its own weight, on saddles
 KIND_OF_WAVES = {"oval": "ovality", "seam": "seams"}
@@ -103,13 +102,8 @@ class RingFeatures:
         chosen = [i for i, one in enumerate(COMPONENTS) if one.shape == "mean"]
         turn = self._of_levels
         parts = [turn @ self._means.unseen(i) @ turn.T for i in chosen]
-        sizes = np.maximum([np.trace(part) for part in parts], 1e-30)
-        known = told_by(float(sizes @ assumed[chosen] / sizes.sum()))
-        by = "B" if known == "assumed" else "A"
-        columns = factor_of(sum(parts))
-        if not columns.shape[1]:
-            return ()
-        return (self._padded(Factor("bulge", columns, type=by, note=known)),)
+        found = factor_of_unseen("bulge", parts, [np.trace(one) for one in parts], assumed[chosen])
+        return (self._padded(found),) if found.columns.shape[1] else ()
 
     def _of_waves(self):
         """`Factor`s of the departures from a circle, of the declared size."""

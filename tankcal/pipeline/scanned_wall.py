@@ -31,12 +31,11 @@ from tankcal.geometry.field.solids import SolidField, estimate_sizes
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.geometry.primitives import sphere_distances, unit_vectors
 from tankcal.pipeline.survey_warnings import noise_is_estimated
-from tankcal.pipeline.tanks.common import told_by
+from tankcal.pipeline.tanks.common import factor_of_unseen
 from tankcal.pipeline.tanks.solid import solid_as_surveyed
 from tankcal.sections import coordinates_of
 from tankcal.tank.factors import Factor, survey_factors
 from tankcal.tank.surveyed_form import NODES, SurveyedForm, node_levels
-from tankcal.uncertainty import factor_of
 
 KINDS = ("bulge", "ovality", "oblateness", "seams")
 MOST_ROUNDS = 10
@@ -175,10 +174,8 @@ def _of_the_unseen(field, found, rows):
         if not chosen:
             continue
         parts = [found.unseen[i][rows, rows] for i in chosen]
-        sizes = np.maximum([np.trace(part) for part in parts], 1e-30)
-        known = told_by(float(sizes @ assumed[chosen] / sizes.sum()))
-        by = "B" if known == "assumed" else "A"
-        factors.append(Factor(kind, factor_of(sum(parts)), type=by, note=known))
+        sizes = [np.trace(one) for one in parts]
+        factors.append(factor_of_unseen(kind, parts, sizes, assumed[chosen]))
     return tuple(one for one in factors if one.columns.shape[1])
 
 

@@ -37,9 +37,8 @@ def expect_amplitudes(field):
     """
     amplitudes, covariances = field.amplitudes, Covariances(field.sites, field.nominal_m)
     sizes = amplitudes.likely_m2
-    likely = replace(
-        field, amplitudes=replace(amplitudes, log_covariance=np.zeros(2 * sizes.shape))
-    )
+    sure = replace(amplitudes, log_covariance=np.zeros_like(amplitudes.log_covariance))
+    likely = replace(field, amplitudes=sure)
     precision = restricted_precision(likely.covariance_m2, free_design(field.sites)[0])
     shares = [
         precision @ covariances.total(size * (np.arange(len(sizes)) == i))

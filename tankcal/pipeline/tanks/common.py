@@ -1,13 +1,28 @@
-"""What tanks of every kind have: estimates of their inputs, deadwood, and a temperature."""
+"""What tanks of every kind have: what no reading saw, inputs, deadwood, and a temperature."""
 
 from dataclasses import replace
 
 import numpy as np
 
+from tankcal.tank.factors import Factor
 from tankcal.tank.fittings import deadwood
 from tankcal.tank.heads import End, standard_end
+from tankcal.uncertainty import factor_of
 
 LEARNED, HALF_LEARNED = 0.1, 0.5  # share of a variance's logarithm that is assumed, at most
+
+
+def factor_of_unseen(kind, parts, sizes, assumed):
+    """`Factor` of what no reading saw of some components of one kind.
+
+    parts    (f, f) covariance by each of them
+    sizes    (k,) how much of the doubt each is
+    assumed  (k,) share of each amplitude that is assumed
+    """
+    sizes = np.maximum(sizes, 1e-30)
+    known = told_by(float(sizes @ assumed / sizes.sum()))
+    by = "B" if known == "assumed" else "A"
+    return Factor(kind, factor_of(sum(parts)), type=by, note=known)
 
 
 def told_by(assumed):

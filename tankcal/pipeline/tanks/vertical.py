@@ -12,13 +12,13 @@ from tankcal.pipeline.tanks.common import (
     as_declared,
     deadwood_part,
     estimates_of,
+    factor_of_unseen,
     is_warmed,
     thermal_scale,
-    told_by,
 )
 from tankcal.tank.body import Body, ShellPart
 from tankcal.tank.courses import DEPARTURES, CourseShape
-from tankcal.tank.factors import Factor, cause_factors
+from tankcal.tank.factors import cause_factors
 from tankcal.tank.fittings import floating_roof
 from tankcal.tank.heads import End, standard_end
 from tankcal.tank.hydrostatics import liquid_head
@@ -28,7 +28,6 @@ from tankcal.tank.tips import FORMS as TIPS
 from tankcal.tank.tips import tip_of
 from tankcal.tank.tops import HeadedShell
 from tankcal.tank.volumes import ShellVolume
-from tankcal.uncertainty import factor_of
 
 # A bottom whose plan is the shell's own: what widens the shell widens it, too.
 
@@ -330,8 +329,8 @@ def _of_the_unseen(wall, volume, features, declared, *, scanned):
     need not meet at least, for their readings cannot say that there are none; those of a scan,
     which are means of cells that leave nothing out, can.
     """
-    amplitudes, top = wall.field.amplitudes, volume.weights_m([volume.height_m])[0]
-    assumed, found = amplitudes.assumed_share(), []
+    assumed, found = wall.field.amplitudes.assumed_share(), []
+    top = volume.weights_m([volume.height_m])[0]
     for kind in KINDS:
         chosen = [
             index
@@ -346,10 +345,7 @@ def _of_the_unseen(wall, volume, features, declared, *, scanned):
             if kind == "seams" and not scanned:
                 parts.append(_of_hidden_seams(features, top, sum(parts)))
                 told = np.append(told, 1.0)
-            sizes = np.maximum([top @ part @ top for part in parts], 1e-30)
-            known = told_by(float(sizes @ told / sizes.sum()))
-            by = "B" if known == "assumed" else "A"
-            found.append(Factor(kind, factor_of(sum(parts)), type=by, note=known))
+            found.append(factor_of_unseen(kind, parts, [top @ one @ top for one in parts], told))
     return tuple(one for one in found if one.columns.shape[1])
 
 
