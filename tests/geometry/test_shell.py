@@ -50,6 +50,20 @@ def test_a_vertical_dent_is_form_and_not_clutter():
     assert np.sum(shell.reason != "") <= 4
 
 
+def test_a_small_tank_may_depart_by_more_than_a_hundredth():
+    """An ellipse of 60 mm that grows up the shell, R 4 m; a point 150 mm off is none of it."""
+    rng = np.random.default_rng(3)
+    azimuth, z = (
+        np.tile(np.arange(24) * np.pi / 12, 6),
+        np.repeat([1.6, 3.2, 4.6, 6.2, 7.6, 9.2], 24),
+    )
+    radius = 4.0 + 0.06 * z / 9.2 * np.cos(2 * azimuth) + 0.001 * rng.normal(size=len(z))
+    radius[77] -= 0.15
+    xyz = np.column_stack([radius * np.sin(azimuth), radius * np.cos(azimuth), z])
+    shell = find_shell(xyz, np.array([1.0, 4.0, 7.0, 10.0]), 4.0)
+    assert [*np.flatnonzero(shell.reason != "")] == [77]
+
+
 @pytest.mark.slow
 def test_a_single_blunder_is_found_by_its_normalised_residual():
     xyz = wall(np.random.default_rng(9))
