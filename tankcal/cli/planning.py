@@ -12,7 +12,13 @@ from tankcal.cli.showing import (
     speak,
     warn,
 )
-from tankcal.cli.wall_plans import plan_holds, planned_setups, wall_item, wall_summary
+from tankcal.cli.wall_plans import (
+    plan_holds,
+    planned_setups,
+    wall_item,
+    wall_scatter,
+    wall_summary,
+)
 from tankcal.messages import message
 from tankcal.text.digits import fixed, format_significant, format_with_u
 
@@ -84,12 +90,14 @@ def _plan(options):
     if options.smallest:
         _refuse_unlimited(plan)
     if is_wall:
-        _refuse_simulation(options)
+        _refuse_simulation(plan, options)
     show.step(message("plan_predicting", "predicting the survey"))
     try:
         prediction = predict(plan)
-    except TankcalError:
+    except TankcalError as error:
         warn(plan.warnings)
+        for line in _remedies(plan, error, options, show):
+            say(line)
         raise
     effects, path = _studied(plan, prediction, options, show)
     simulated = _simulated(prediction, options, show)
@@ -102,7 +110,8 @@ def _plan(options):
     show.end()
     warn(prediction.warnings)
     told = wall_summary(prediction) if is_wall else _summary(prediction)
-    found = (*told, *_verdict(prediction), *_changes(effects), *_design(path), *_scatter(simulated))
+    scatter = wall_scatter(simulated) if is_wall else _scatter(simulated)
+    found = (*told, *_verdict(prediction), *_changes(effects), *_design(path), *scatter)
     for line in found:
         say(line)
     if written:
@@ -124,13 +133,13 @@ def _refuse_idle(options):
         )
 
 
-def _refuse_simulation(options):
+def _refuse_simulation(plan, options):
     from tankcal.errors import InputError, Problem
 
-    if options.simulate is not None:
+    if options.simulate is not None and plan.design.runs:
         expected = message(
-            "plan_wall_not_simulated",
-            "not for a plan of straps, lines, hits, tangents or liquid; expected a plan of targets",
+            "plan_runs_not_simulated",
+            "not for a plan of runs of liquid; expected a plan without [[runs]]",
         )
         raise InputError(Problem("--simulate", expected))
 
@@ -153,12 +162,36 @@ def _studied(plan, prediction, options, show):
     return effects, smallest(plan, progress=show.part) if options.smallest else None
 
 
+def _remedies(plan, error, options, show):
+    """Additions that would give a solution to a survey of targets that has none."""
+    from tankcal.errors import SolutionError
+    from tankcal.planning.improvements import what_would_do
+    from tankcal.planning.model import Plan
+
+    if not options.changes or not isinstance(error, SolutionError) or not isinstance(plan, Plan):
+        return
+    found = what_would_do(plan, progress=show.part)
+    show.end()
+    if found:
+        yield message("plan_remedies", "what would determine it, the best first:")
+    for one in found[:SHOWN]:
+        yield message(
+            "plan_remedy",
+            "  {change}: U/V {relative}",
+            change=describe_change(one.change),
+            relative=_percent(one.relative_u),
+        )
+
+
 def _simulated(prediction, options, show):
     from tankcal.planning.simulations import simulate
+    from tankcal.planning.wall.prediction import WallPrediction
+    from tankcal.planning.wall.simulations import simulate_walls
 
     if options.simulate is None:
         return None
-    return simulate(prediction, options.simulate, options.seed, options.blunders, show.part)
+    draw = simulate_walls if isinstance(prediction, WallPrediction) else simulate
+    return draw(prediction, options.simulate, options.seed, options.blunders, show.part)
 
 
 def _bases(count):

@@ -74,6 +74,34 @@ def _filling(found):
         )
 
 
+def wall_scatter(found):
+    """What simulated surveys of drawn walls gave; None: there were none."""
+    if found is None:
+        return
+    low, median, high = found.U_ratios
+    yield message(
+        "plan_wall_scatter",
+        "{runs} simulated surveys of drawn walls: error of the volume over prediction {ratio:.3f} "
+        "(known to {ratio_sd:.2g}); U over prediction {median:.2f} ({low:.2f} to {high:.2f}); true "
+        "volume within U in {covered} of full tanks, {rows} of all rows; {aside:.1f} readings set "
+        "aside on average, without a solution: {failed}",
+        runs=found.runs,
+        ratio=found.volume_ratio,
+        ratio_sd=found.volume_ratio_sd,
+        median=median,
+        low=low,
+        high=high,
+        covered=_share(found.covered),
+        rows=_share(found.within.mean()),
+        aside=found.set_aside.mean(),
+        failed=len(found.failed),
+    )
+
+
+def _share(number):
+    return f"{fixed(100 * float(number), 1, marks())} %"
+
+
 def wall_item(change):
     """An item of a plan of the wall; None of other plans."""
     from tankcal.planning.wall.changes import NUMBERED

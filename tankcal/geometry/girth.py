@@ -65,7 +65,7 @@ def perimeter_excess(shape_sd_m, radius_m, *, shares=None):
     """
     if shape_sd_m == 0:
         return 0.0, 0.0
-    modes = _modes_of(radius_m)
+    modes = modes_of(radius_m)
     spectra = mode_shares(modes, radius_m)
     rng = np.random.default_rng(0)
     found = []
@@ -133,9 +133,9 @@ def seen_excess(amplitudes, radius_m, rings):
     >>> many < few / 2
     True
     """
-    modes = _modes_of(radius_m)
+    modes = modes_of(radius_m)
     spectra, rng, found = mode_shares(modes, radius_m), np.random.default_rng(0), []
-    nodes = NODES_OF_WAVE * (len(modes) + 2)
+    nodes = nodes_of(radius_m)
     turn = FULL_TURN * np.arange(nodes) / nodes
     chosen = np.unique(np.linspace(0, len(rings) - 1, MOST_RINGS).astype(int))
     known = [_Known(rings[i], turn, radius_m) for i in chosen]
@@ -200,7 +200,7 @@ def tangent_excess(amplitudes, radius_m):
     >>> 0 < mean < 1e-3
     True
     """
-    spectra, rng = mode_shares(_modes_of(radius_m), radius_m), np.random.default_rng(0)
+    spectra, rng = mode_shares(modes_of(radius_m), radius_m), np.random.default_rng(0)
     means, spreads = [], []
     for sizes in _drawn_sizes(amplitudes, rng):
         variances = sum(sizes[one] * spectra[one] for one in sizes)
@@ -231,8 +231,14 @@ def _sizes_of(variances_m2):
     return found
 
 
-def _modes_of(radius_m):
+def modes_of(radius_m):
+    """(modes,) waves round a wall of that radius, from k = 2 to the shortest that a plate takes."""
     return np.arange(2.0, max(37.0, np.ceil(FULL_TURN * radius_m / SHORTEST_WAVE_M)))
+
+
+def nodes_of(radius_m):
+    """How many nodes a drawn outline of such a wall has."""
+    return NODES_OF_WAVE * (len(modes_of(radius_m)) + 2)
 
 
 def _support_at(at, radii_m):
@@ -262,19 +268,52 @@ def _drawn_shares(rng):
 
 def _outline(rng, variances_m2, radius_m):
     """(n,) radii of an outline whose waves, from k = 2 on, have these mean squares about it."""
-    count = NODES_OF_WAVE * (len(variances_m2) + 2)
-    waves = np.zeros(count // 2 + 1, dtype=complex)
-    drawn = rng.normal(size=(2, len(variances_m2)))
-    waves[2 : len(variances_m2) + 2] = np.sqrt(variances_m2) * (drawn[0] - 1j * drawn[1])
-    return radius_m + np.fft.irfft(waves, count) * count / 2
+    return radius_m + draw_waves(rng, variances_m2)
+
+
+def draw_waves(rng, variances_m2, draws=()):
+    """Departures of outlines from a circle, at even azimuths clockwise from 0.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    variances_m2 : ndarray, shape (modes,)
+        Mean squares about the outline of its waves, from k = 2 on.
+    draws : tuple of int
+        How many outlines.
+
+    Returns
+    -------
+    ndarray, shape (*draws, n)
+        n is NODES_OF_WAVE for each of the shortest waves.
+    """
+    modes = len(variances_m2)
+    count = NODES_OF_WAVE * (modes + 2)
+    waves = np.zeros((*draws, count // 2 + 1), dtype=complex)
+    drawn = rng.normal(size=(2, *draws, modes))
+    waves[..., 2 : modes + 2] = np.sqrt(variances_m2) * (drawn[0] - 1j * drawn[1])
+    return np.fft.irfft(waves, count) * count / 2
 
 
 def _excess_of(radii_m):
     """P^2 / (4 pi A) - 1 of the hull's perimeter and the outline's area, radii at even azimuths."""
-    turn = FULL_TURN * np.arange(len(radii_m)) / len(radii_m)
-    chords = (turn[1] / np.sin(turn[1] / 2) / 2) ** 2  # of the polygon of a circle, to its arcs
-    perimeter_m = hull_perimeter(radii_m * np.exp(1j * turn))
-    return chords * perimeter_m**2 / (2 * np.sum(radii_m**2) * turn[1] * np.pi) - 1
+    area_m2 = np.sum(radii_m**2) * FULL_TURN / len(radii_m) / 2
+    return girth_of(radii_m) ** 2 / (4 * np.pi * area_m2) - 1
+
+
+def girth_of(radii_m):
+    """Perimeter of the convex hull of an outline, of its radii (n,) at even azimuths, m.
+
+    That of the polygon, longer by what a circle is than its own.
+
+    Examples
+    --------
+    >>> float(round(girth_of(np.full(360, 7.0)) / (2 * np.pi * 7.0), 9))
+    1.0
+    """
+    step = FULL_TURN / len(radii_m)
+    turn = step * np.arange(len(radii_m))
+    return step / np.sin(step / 2) / 2 * hull_perimeter(radii_m * np.exp(1j * turn))
 
 
 def hull_perimeter(places):

@@ -23,7 +23,10 @@ OF_VERTICAL = message(
     "plumb lines, height differences, vertical or zenith angles, or control points with "
     "known heights determine it",
 )
-OF_SCALE = message("gives_scale", "distances, or control points in different places, determine it")
+OF_SCALE = message(
+    "gives_scale",
+    "distances, a stadia bar, or control points in different places, determine it",
+)
 
 
 def noise_is_estimated(job):

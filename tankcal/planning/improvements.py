@@ -22,6 +22,7 @@ from tankcal.planning.wall.changes import SEARCHED
 from tankcal.planning.wall.model import WallPlan
 from tankcal.survey import predict_survey
 
+OF_FRAME = ("tape", "base", "control_point")  # items that may tell what a survey leaves open
 REPEATED = 10  # steps of a greedy search, where nothing else ends it
 LEAST_GAIN = 1e-3  # of U over volume, for which an item is added
 
@@ -41,6 +42,17 @@ class Effect:
     U_m3: float
     poor: int
     why: str = ""
+
+
+@dataclass(frozen=True)
+class _NothingBefore:
+    """In place of the Prediction of a plan that has none."""
+
+    tabled: None = None
+    relative_u: float = np.nan
+
+
+NOTHING_BEFORE = _NothingBefore()
 
 
 @dataclass(frozen=True)
@@ -107,6 +119,25 @@ def what_helps(plan, changes=None, progress=None, before=None):
         progress(message("plan_trying_changes", "trying changes"), number, len(changes))
         found.append(_effect(one, before))
     return tuple(sorted(found, key=lambda one: one.relative_u))
+
+
+def what_would_do(plan, progress=None):
+    """Effect of each addition that gives a solution to a plan that has none, the best first.
+
+    Parameters
+    ----------
+    plan : Plan
+        Whose survey would leave its datum, its scale or the vertical open.
+    progress : callable, optional
+        progress(text, done, total).
+
+    Returns
+    -------
+    tuple of Effect
+        Their difference is nan: there is nothing before.
+    """
+    found = what_helps(plan, changes_of(plan, ("add",), OF_FRAME), progress, NOTHING_BEFORE)
+    return tuple(one for one in found if not one.why)
 
 
 def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, progress=None):
@@ -246,7 +277,7 @@ def _effect(change, before):
         seen = visible(plan)
         refuse_blind(plan, seen)
         predicted = predict_survey(measurements_of(plan, seen), nominal_of(plan))
-        tabled = recompute_table(plan, predicted, before.tabled)
+        tabled = before.tabled and recompute_table(plan, predicted, before.tabled)
         tabled = tabled or predicted_table(plan, predicted)
     except TankcalError as error:
         why, inf = str(error).splitlines()[0], float("inf")

@@ -161,8 +161,8 @@ def predict(plan):
     try:
         tabled = predicted_table(plan, predicted)
     except SolutionError as error:
-        told = [str(error), *(one.expected for one in idle_ties(plan, points))]
-        raise SolutionError("; ".join(told)) from error
+        idle = (one.expected for one in idle_ties(plan, points))
+        raise SolutionError(*error.texts, *idle) from error
     refuse_without_delivery(plan, tabled, plan.shell.high_m - plan.shell.low_m)
     return Prediction(plan, seen, measurements, predicted, tabled, points)
 

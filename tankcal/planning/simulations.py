@@ -18,6 +18,7 @@ from tankcal.planning.prediction import Prediction
 from tankcal.survey import adjust_survey, wall_points
 
 OF_SURVEY = ("points", "instrument_scale", "instrument_offset")
+SIMULATING = message("plan_simulating", "simulating surveys")
 BLUNDER_SDS = 20.0  # size of a blunder, in standard deviations of its reading
 
 
@@ -86,7 +87,7 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
     found, volumes, aside = [], [], []
     for run in range(1, runs + 1):
         if progress:
-            progress(message("plan_simulating", "simulating surveys"), run, runs)
+            progress(SIMULATING, run, runs)
         drawn = draw_measurements(
             prediction.plan, prediction.measurements, prediction.predicted, rng
         )
@@ -98,16 +99,7 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
         found.append(dict(zip(adjustment.names, adjustment.xyz_m, strict=True)))
         volumes.append(volume)
         aside.append(len(adjustment.removed))
-    if len(found) < 2:
-        raise SolutionError(
-            message(
-                "plan_simulations_failed",
-                "{failed} of {runs} simulated surveys have no solution: {first}",
-                failed=len(failed),
-                runs=runs,
-                first=failed[0],
-            )
-        )
+    refuse_failed(failed, runs)
     names = tuple(name for name in found[0] if all(name in one for one in found))
     xyz = np.array([[one[name] for name in names] for one in found])
     sds = {one.name: one.sd_m for one in prediction.points}
@@ -123,6 +115,23 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
         predicted_volume_m3=_by_survey(prediction.table),
         set_aside=np.array(aside),
     )
+
+
+def refuse_failed(failed, runs):
+    """Raise SolutionError where fewer than two of the surveys have a solution.
+
+    failed  messages of those that have none
+    """
+    if runs - len(failed) < 2:
+        raise SolutionError(
+            message(
+                "plan_simulations_failed",
+                "{failed} of {runs} simulated surveys have no solution: {first}",
+                failed=len(failed),
+                runs=runs,
+                first=failed[0],
+            )
+        )
 
 
 def _made(plan, measurements):
@@ -144,16 +153,16 @@ def _spoilt(measurements, share, rng):
     images = measurements.image_points
     if images is not None:
         along = np.eye(2)[rng.integers(2, size=len(images.point))]
-        off = _off(rng, share, len(along))[:, None] * along * images.sd_mm
+        off = blunders_in_sds(rng, share, len(along))[:, None] * along * images.sd_mm
         images = replace(images, xy_mm=images.xy_mm + off)
     readings = tuple(
-        replace(one, value=one.value + _off(rng, share, len(one.end)) * one.sd)
+        replace(one, value=one.value + blunders_in_sds(rng, share, len(one.end)) * one.sd)
         for one in measurements.readings
     )
     return replace(measurements, image_points=images, readings=readings)
 
 
-def _off(rng, share, count):
+def blunders_in_sds(rng, share, count):
     """(count,) errors in standard deviations: 0, or for a share of them a blunder."""
     sign = np.where(rng.random(count) < 0.5, -1.0, 1.0)
     return BLUNDER_SDS * sign * (rng.random(count) < share)

@@ -1,5 +1,7 @@
 """The prediction of a wall by tape, lines, hits, tangents or liquid as it is saved: plan.json."""
 
+from dataclasses import replace
+
 from tankcal.planning.wall.changes import wall_count
 from tankcal.planning.wall.filling_outlook import FillingOutlook
 from tankcal.planning.wall.prediction import CourseOutlook, ReadingsOutlook
@@ -35,6 +37,24 @@ class PlannedWall(Saved):
     batches: int = key("of them")
 
 
+class SimulatedWallPlan(Saved):
+    """What many simulated surveys of the plan gave, each of a wall that was drawn."""
+
+    seed: int = key("of the draws")
+    blunders: float = key("share of readings that were off")
+    runs: int = key("that had a solution")
+    failed: list[str] = key("messages of the others")
+    predicted_u_m3: float = key("of the full tank, by the survey alone")
+    predicted_U_m3: float = key("the same, expanded")
+    errors_m3: list[float] = key("volume of the full tank less the true one, of each run")
+    U_m3: list[float] = key("its U by the survey alone, as each run states it")
+    volume_error_over_predicted: float = key("rms over u", of="volume_ratio")
+    volume_error_over_predicted_sd: float = key("its sd", of="volume_ratio_sd")
+    covered: float = key("share of full tanks within their U")
+    within: list[float] = key("share of the rows within theirs, of each run")
+    set_aside: list[int] = key("readings that the search took out, of each run")
+
+
 class WallPlanFile(Saved, kw_only=True):
     """What a survey of a wall by tape, reference lines, hits, tangents or liquid would give."""
 
@@ -50,19 +70,24 @@ class WallPlanFile(Saved, kw_only=True):
     reliability: list[ReadingsOutlook] = key("of straps, offsets and tangents")
     filling: FillingOutlook | None = key("what runs of liquid would add; null: there are none")
     warnings: list[WarningRecord] = key("what should be read")
+    simulated: SimulatedWallPlan | None = key(
+        "left out where it was not asked for", optional=True, default=None
+    )
     job: list[Fingerprint] = key("files of the empty job", default=())
 
 
-def plain_of_wall(prediction, job=()):
-    """The `WallPlanFile` of a WallPrediction, as plain data; job: [{file, sha256}] of its job."""
+def plain_of_wall(prediction, simulated=None, job=()):
+    """The `WallPlanFile` of a WallPrediction, as plain data.
+
+    simulated  `SimulatedWall`, or None        job  [{file, sha256}] of the empty job
+    """
     found = filled_from(
         WallPlanFile,
         prediction,
         survey=survey_of(prediction.plan),
-        job=job,
         **parts_of_any_plan(prediction),
     )
-    return to_plain(found)
+    return to_plain(replace(found, simulated=filled_from(SimulatedWallPlan, simulated), job=job))
 
 
 def survey_of(plan):

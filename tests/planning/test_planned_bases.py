@@ -15,7 +15,7 @@ from tankcal.errors import InputError, SolutionError
 from tankcal.job import load
 from tankcal.planning import load_plan, predict
 from tankcal.planning.changes import changes_of, cost_of
-from tankcal.planning.improvements import what_helps
+from tankcal.planning.improvements import what_helps, what_would_do
 from tankcal.planning.measurements import draw_measurements
 from tankcal.report.planning import empty_job, workbook
 from tankcal.report.planning.field_sheets import sheets
@@ -111,6 +111,22 @@ def test_without_a_bar_nothing_tells_the_scale(tmp_path):
     (tmp_path / "plan.toml").write_text(text + tape + "low_m = 0.5\ns_mm = 1\n")
     (group,) = (one for one in predict(load_plan(tmp_path)).reliability if one.kind == "distance")
     assert group.uncontrolled == 1  # nothing controls what alone tells the scale
+
+
+@pytest.mark.slow
+def test_what_would_tell_the_scale(tmp_path, capsys):
+    """Second method: the plan after each; a bar that is there is named first, in the language."""
+    folder = with_stadia(tmp_path, "")
+    found = what_would_do(load_plan(folder))
+    assert {"base", "tape"} <= {one.change.item for one in found}
+    assert all(one.relative_u == predict(one.change.plan).relative_u for one in found[:2])
+    assert [one.relative_u for one in found] == sorted(one.relative_u for one in found)
+    asked = ["plan", str(folder), "--changes", "--quiet", "--language", "es"]
+    assert main(asked) == 3
+    said = capsys.readouterr()
+    assert "añadir base" in said.out
+    assert "estadía" in said.err
+    assert "Traceback" not in said.err
 
 
 def test_base_from_one_end_is_named(tmp_path):

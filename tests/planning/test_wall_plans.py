@@ -8,6 +8,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import openpyxl
 import pytest
 from draws import draws
 from generated_hits import hit_job
@@ -36,8 +37,9 @@ from tankcal.planning.wall.nominal_readings import with_nominal_readings
 from tankcal.planning.wall.prediction import foresee_table
 from tankcal.planning.wall.reading import changed, tables_of
 from tankcal.record.wall_plan import WALL_PLAN, plain_of_wall
-from tankcal.report.planning import wall_files
+from tankcal.report.planning import wall_files, workbook
 from tankcal.report.planning.wall_files import form_of_wall
+from tankcal.report.planning.wall_paper import WallPaper
 from tankcal.report.planning.wall_rows import field_tables_of_wall
 
 STRAPS_ALONE = (
@@ -513,12 +515,13 @@ def test_files_of_a_plan(tmp_path, capsys):
     assert "anillo 1: u del radio medio" in capsys.readouterr().out
     saved = json.loads((out / "plan.json").read_text(encoding="utf-8"))
     assert WALL_PLAN.migrated(saved, "plan.json")["survey"]["offsets"] == 288
-    assert {one.name for one in out.iterdir()} >= {"prediction.pdf", "field-sheets.pdf", "job"}
+    assert {one.name for one in out.iterdir()} >= {
+        *("prediction.pdf", "field-sheets.pdf", "field-sheets.xlsx", "job")
+    }
     assert main(["plan", str(LINES), "--out", str(out), "--quiet"]) == 0
     path = out / "job" / "circumferences.csv"
     path.write_text(path.read_text(encoding="utf-8").replace("1-20,1,0.36,,", "1-20,1,0.36,47.9,"))
     assert main(["plan", str(LINES), "--out", str(out), "--quiet"]) == 2
-    assert main(["plan", str(LINES), "--simulate", "5", "--quiet"]) == 2
 
 
 def test_plain_data_have_what_the_prediction_has(prediction):
@@ -537,3 +540,51 @@ def test_nothing_is_said_of_costs_that_nobody_gave(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "ppm)" in said
     assert "cost" not in said
+
+
+SHEETS = {  # of a plan: sheets of its workbook, and how many rows they have
+    LINES: {"Circumferences": 3, "Lines": 12, "Levels": 12, "Offsets": 144, "Instruments": 2},
+    HITS: {"Circumferences": 6, "Set-ups of hits": 1, "Levels of hits": 10, "Control targets": 6},
+    TANGENTS: {"Stations of tangents": 8, "Traverse": 16, "Tangents": 160, "Instruments": 1},
+    LINES.parent / "plan-liquid": {"Circumferences": 12, "Runs": 28, "Instruments": 1},
+}
+
+
+@pytest.mark.parametrize("folder", SHEETS, ids=lambda one: one.name)
+def test_field_sheets_as_a_workbook(folder, tmp_path):
+    """A sheet for each table of the paper, a row for each reading."""
+    workbook.write_of_wall(WallPaper(predict(load_plan(folder)), "en"), tmp_path / "x.xlsx")
+    book = openpyxl.load_workbook(tmp_path / "x.xlsx")
+    for name, rows in SHEETS[folder].items():
+        (table,) = book[name].tables.values()
+        first, last = (int("".join(filter(str.isdigit, one))) for one in table.ref.split(":"))
+        assert last - first == rows
+        headings = [one.value for one in book[name][first]]
+        assert len(set(headings)) == len(headings)
+
+
+def test_a_workbook_of_the_same_plan_has_the_same_bytes(tmp_path):
+    paper = WallPaper(predict(load_plan(HITS)), "pt-BR")
+    for name in ("one.xlsx", "two.xlsx"):
+        workbook.write_of_wall(paper, tmp_path / name)
+    assert (tmp_path / "one.xlsx").read_bytes() == (tmp_path / "two.xlsx").read_bytes()
+
+
+def test_offsets_have_a_row_for_each_level_of_each_line(tmp_path):
+    """A column for each face; readings of one face are numbered where there are more."""
+    folder = plan_of(
+        tmp_path / "plan",
+        LINES,
+        ("faces = 2", "faces = 1\nreadings = 2"),
+    )
+    path = folder / "instruments.toml"
+    path.write_text(path.read_text(encoding="utf-8") + "u_collimation_arcsec = 10\n")
+    rows, columns = field_tables_of_wall(load_plan(folder))["offset_readings"]
+    assert len(rows) == 12 * 12 * 2
+    keys = [one.key for one in columns]
+    assert "face_1" in keys
+    assert "face_2" not in keys
+    assert "reading" in keys
+    rows, columns = field_tables_of_wall(load_plan(LINES))["offset_readings"]
+    assert len(rows) * 2 == len(load_plan(LINES).job.lines.offsets)
+    assert {"face_1", "face_2"} <= {one.key for one in columns}

@@ -275,14 +275,24 @@ def tangent_sight(station, z, radius_m, is_right):
 
     A circle's zero is +y; z  of the level that is touched
     """
-    x, y, from_z = station
-    distance = np.hypot(x, y)
-    turn = np.arcsin(radius_m / distance) * (1 if is_right else -1)
-    length = np.sqrt(distance**2 - radius_m**2)
+    azimuth, length = limb_of_circle(station[:2], radius_m, is_right=is_right)
     return {
-        "direction_deg": float(np.degrees(np.arctan2(-x, -y) + turn) % 360),
-        "zenith_deg": float(np.degrees(np.arctan2(length, z - from_z))),
+        "direction_deg": float(np.degrees(azimuth) % 360),
+        "zenith_deg": float(np.degrees(np.arctan2(length, z - station[2]))),
     }
+
+
+def limb_of_circle(station_m, radius_m, *, is_right):
+    """Azimuth of a sight from a station (2,) to a limb of a circle about the origin, its length."""
+    away = np.hypot(*station_m)
+    turn = np.arcsin(radius_m / away) * (1 if is_right else -1)
+    return azimuth_of_axis(station_m) + turn, np.sqrt(away**2 - radius_m**2)
+
+
+def azimuth_of_axis(station_m):
+    """Of the origin, from a station (2,)."""
+    x, y = station_m
+    return np.arctan2(-x, -y)
 
 
 def _kinds_of_sights(s_mm, s_arcsec):

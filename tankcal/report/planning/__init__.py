@@ -76,13 +76,14 @@ def _write(paper, folder, progress):
 
 def _write_wall(paper, folder, progress):
     """The files of a WallPaper."""
-    from tankcal.report.planning import empty_job, wall_files
+    from tankcal.report.planning import empty_job, wall_files, workbook
     from tankcal.report.planning.wall_paper import wall_outlook, wall_sheets
 
     progress(WRITING_JOB)
     wall_files.write_empty_job(paper.prediction, folder / JOB)
     progress(WRITING_TABLES)
     wall_files.write_wall(paper, folder, empty_job.fingerprints(folder / JOB))
+    workbook.write_of_wall(paper, folder / "field-sheets.xlsx")
     _set(paper, folder, progress, wall_outlook(paper), wall_sheets(paper))
 
 

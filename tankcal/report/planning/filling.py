@@ -119,17 +119,14 @@ def _radius(paper, found):
     return [paper.paragraph("filling_radius", radius=least)]
 
 
-def sheet_of_runs(paper):
-    """The blocks of the field sheet of the runs."""
-    rows = rows_of_runs(paper.plan)
-    if not rows:
-        return []
+def sheet_of_runs(paper, table):
+    """The blocks of the field sheet of the runs; table: its rows and columns."""
     told = [paper.word(f"forms.{one}") for one in ("tight_how", "batches")]
     return [
         paper.heading("runs"),
         paper.paragraph("wall_runs"),
         blocks.listing(told),
-        paper.table("runs", rows, RUNS),
+        paper.table("runs", *table),
     ]
 
 

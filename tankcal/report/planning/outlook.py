@@ -272,15 +272,22 @@ def _simulated(paper):
     found = paper.simulated
     if found is None:
         return []
-    shares = {
-        "simulated_coordinates": found.ratio,
-        "simulated_volume": found.volume_ratio,
+    values = {
+        "simulated_coordinates": paper.number(found.ratio, decimals=3),
+        "simulated_volume": paper.number(found.volume_ratio, decimals=3),
     }
-    said = [
-        paper.paragraph(
-            "simulated", seed=str(found.seed), sd=paper.number(found.volume_ratio_sd, digits=2)
-        )
-    ]
+    return simulated_surveys(paper, "simulated", values)
+
+
+def simulated_surveys(paper, about, values):
+    """The blocks of simulated surveys of any plan.
+
+    about   the text that says how they were drawn
+    values  {label: text} of what they gave
+    """
+    found = paper.simulated
+    known = paper.number(found.volume_ratio_sd, digits=2)
+    said = [paper.paragraph(about, seed=str(found.seed), sd=known)]
     if found.blunders:
         share, times = paper.three_digits(found.blunders), paper.plain(BLUNDER_SDS)
         said.append(paper.paragraph("simulated_blunders", share=share, times=times))
@@ -290,7 +297,7 @@ def _simulated(paper):
         paper.facts(
             [
                 ("simulated_surveys", _count(paper, found.runs)),
-                *((key, paper.number(value, decimals=3)) for key, value in shares.items()),
+                *values.items(),
                 ("simulated_aside", paper.number(float(found.set_aside.mean()), decimals=1)),
                 ("simulated_failed", _count(paper, len(found.failed))),
             ]

@@ -20,7 +20,7 @@ READ = (  # left blank
 
 def write_wall(paper, folder, fingerprints):
     """Write plan.json and the CSV files; fingerprints: [{file, sha256}] of the empty job."""
-    found = plain_of_wall(paper.prediction, fingerprints)
+    found = plain_of_wall(paper.prediction, paper.simulated, fingerprints)
     save(found, folder / "plan.json")
     write_capacity(found, folder)
     write_effects(paper, folder)

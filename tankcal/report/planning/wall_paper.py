@@ -9,7 +9,7 @@ from tankcal.report import blocks
 from tankcal.report.plain import Column
 from tankcal.report.planning.filling import filling, sheet_of_runs
 from tankcal.report.planning.improvements import changes, design
-from tankcal.report.planning.outlook import result, table
+from tankcal.report.planning.outlook import result, simulated_surveys, table
 from tankcal.report.planning.paper import PlanPaper
 from tankcal.report.planning.wall_rows import COURSES, courses_of, field_tables_of_wall
 
@@ -19,7 +19,17 @@ COUNTED = (
 )
 OF_ALL = ("tangents", "dips")  # what a change is of, where it has no name
 
-NARROW = ("sight_lines", "offsets", "shared_targets")  # tables of few columns: two side by side
+ABOUT = {  # what is said before a table of the field sheets
+    "circumferences": "wall_circumferences",
+    "sight_lines": "wall_offsets",
+    "hit_setups": "wall_hits",
+    "control_targets": "wall_control_targets",
+    "tangent_stations": "wall_tangents",
+    "bases": "bases",
+}
+NARROW = (  # tables of few columns: two side by side
+    *("sight_lines", "offsets", "offset_readings", "shared_targets"),
+)
 
 
 class WallPaper(PlanPaper):
@@ -50,6 +60,7 @@ def wall_outlook(paper):
         *filling(paper),
         *_courses(paper),
         *_reliability(paper),
+        *_simulated(paper),
         *changes(paper),
         *design(paper),
     ]
@@ -100,6 +111,20 @@ def _reliability(paper):
             paper.table("reliability", rows, columns)]  # fmt: skip
 
 
+def _simulated(paper):
+    found = paper.simulated
+    if found is None:
+        return []
+    low, median, high = (paper.number(one, decimals=2) for one in found.U_ratios)
+    values = {
+        "simulated_error": paper.number(found.volume_ratio, decimals=3),
+        "simulated_U": paper.word("texts.from_to", middle=median, low=low, high=high),
+        "simulated_covered": paper.number(found.covered, "share", decimals=1),
+        "simulated_rows": paper.number(float(found.within.mean()), "share", decimals=1),
+    }
+    return simulated_surveys(paper, "wall_simulated", values)
+
+
 def wall_sheets(paper):
     """The blocks of the field sheets of a WallPaper."""
     tables = field_tables_of_wall(paper.plan)
@@ -110,18 +135,23 @@ def wall_sheets(paper):
         "control_targets": "control_targets",
         "tangent_stations": "tangents",
         "bases": "bases",
+        "instruments": "equipment",
     }
     found = [*paper.head("field_sheets"), paper.facts(_counts(paper))]
     found += paper.warnings(paper.plan.warnings)
     for name, one in tables.items():
         if name in heads:
-            about = name if name == "bases" else f"wall_{heads[name]}"
-            found += [paper.heading(heads[name]), paper.paragraph(about)]
-        found.append(paper.table(name, *one, across=2 if name in NARROW else None))
+            found.append(paper.heading(heads[name]))
+        if name in ABOUT:
+            found.append(paper.paragraph(ABOUT[name]))
+        found += sheet_of_runs(paper, one) if name == "runs" else [_table(paper, name, one)]
     return [
         *found,
-        *sheet_of_runs(paper),
         paper.heading("afterwards"),
         blocks.listing([paper.word(f"texts.after_{one}") for one in ("job", "names", "run")]),
         blocks.signature([paper.word("signatures.surveyed")]),
     ]
+
+
+def _table(paper, name, table):
+    return paper.table(name, *table, across=2 if name in NARROW else None)

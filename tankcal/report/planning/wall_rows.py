@@ -7,7 +7,8 @@ import numpy as np
 from tankcal.planning.wall.nominal_readings import place_stations
 from tankcal.planning.wall.reading import lengths_of_bars, tables_of
 from tankcal.report.plain import Column
-from tankcal.report.planning.tables import BASES
+from tankcal.report.planning.filling import RUNS, rows_of_runs
+from tankcal.report.planning.tables import BASES, INSTRUMENTS
 from tankcal.survey.stadia import angle_of_distance_rad
 
 HEIGHT = Column("height_m", "m", decimals=3)
@@ -17,6 +18,7 @@ COURSE, COUNT = Column("course"), Column("readings", decimals=0)
 AZIMUTH = Column("azimuth_rad", "rad deg", decimals=1)
 INSTRUMENT, AS_READ = Column("instrument"), Column("value", nothing="_" * 14, words="marks")
 BY_PEN = {"nothing": "_" * 11, "words": "marks"}  # filled in on site
+SHORT = BY_PEN | {"nothing": "_" * 8}
 SD = Column("sd_m", "mm", decimals=2)
 SD_ARCSEC = Column("sd_rad", "rad arcsec", decimals=1, heading="sd_m")
 STRAPS = (
@@ -24,6 +26,10 @@ STRAPS = (
     INSTRUMENT, Column("reading", decimals=0), AS_READ, Column("temperature", nothing="_" * 6),
 )  # fmt: skip
 LINES = (Column("line"), AZIMUTH, INSTRUMENT)
+OFFSET_READINGS = (
+    Column("line"), COURSE, LEVEL, Column("reference", words="marks"),
+    Column("reading", decimals=0), Column("face_1", **SHORT), Column("face_2", **SHORT),
+)  # fmt: skip
 OFFSETS = (COURSE, IN_COURSE, LEVEL, Column("reference", words="marks"), COUNT, SD)
 SETUPS = (
     Column("setup"), AZIMUTH, Column("from_axis_m", "m", decimals=2), HEIGHT, INSTRUMENT,
@@ -61,6 +67,7 @@ def field_tables_of_wall(plan):
         "circumferences": (_straps(plan), STRAPS),
         "sight_lines": (_lines(plan), LINES),
         "offsets": (_offsets(plan), OFFSETS),
+        "offset_readings": (_offset_readings(plan), _columns_of_offsets(plan)),
         "hit_setups": (_setups(plan), SETUPS),
         "hit_levels": (_hits(plan), HITS),
         "shared_targets": (_ties(plan), TIES),
@@ -69,6 +76,8 @@ def field_tables_of_wall(plan):
         "traverse": (_traverse(plan), _columns_of_traverse(plan)),
         "bases": (_bases(plan), BASES),
         "tangents": (_tangents(plan), TANGENTS),
+        "runs": (rows_of_runs(plan), RUNS),
+        "instruments": (_instruments(plan), INSTRUMENTS),
     }
     return {name: table for name, table in found.items() if table[0]}
 
@@ -126,6 +135,63 @@ def _offsets(plan):
         row["readings"] += 1
     count = 1 if given is None else len(given.lines)
     return [row | {"readings": row["readings"] // count} for row in rows.values()]
+
+
+def _offset_readings(plan):
+    """Each level on each line, as often as one face reads it."""
+    given, lines = plan.job.lines, plan.design.lines
+    levels = _offsets(plan)
+    return [
+        level | {"line": name, "reading": number + 1}
+        for name in ({} if given is None else given.lines)
+        for level in levels
+        for number in range(lines.readings)
+    ]
+
+
+def _columns_of_offsets(plan):
+    """Those of OFFSET_READINGS, without a second face or a number where there is one of them."""
+    lines = plan.design.lines
+    left_out = set()
+    if lines is not None:
+        left_out |= {"face_2"} if lines.faces == 1 else set()
+        left_out |= {"reading"} if lines.readings == 1 else set()
+    return tuple(one for one in OFFSET_READINGS if one.key not in left_out)
+
+
+def _instruments(plan):
+    """Instruments that read something, and the masters of tapes, as instruments.toml has them."""
+    register = plan.given.registers.get("instruments")
+    used, rows = _used(plan.job), []
+    for name, entry in {} if register is None else register.entries.items():
+        given = {key: one.raw for key, one in entry.items()}
+        scale = given.get("u_scale_ppm")
+        if name in used:
+            rows.append(
+                {
+                    "instrument": name,
+                    "kind": str(given.get("kind", "")).strip().lower(),
+                    "certificate": str(given.get("certificate", "")),
+                    "u_scale": scale / 1e6 if isinstance(scale, int | float) and scale else None,
+                }
+            )
+    return rows
+
+
+def _used(job):
+    """Names of the instruments of a Job that read something."""
+    found = set()
+    if job.strapping is not None:
+        read = {one.tape for one in job.strapping.straps}
+        found |= read | {one.master for one in job.strapping.tapes if one.name in read}
+    if job.lines is not None:
+        found |= {one.instrument for one in job.lines.lines.values()}
+    for sighted in (job.hits, job.tangents):
+        if sighted is not None:
+            found |= set(sighted.instrument)
+    for given in () if job.measurements is None else job.measurements.readings:
+        found |= set(given.instrument or ())
+    return found
 
 
 def _setups(plan):

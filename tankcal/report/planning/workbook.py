@@ -10,6 +10,7 @@ from tankcal.report.plain import Column
 from tankcal.report.planning import sketches
 from tankcal.report.planning.stands import stands
 from tankcal.report.planning.tables import field_tables
+from tankcal.report.planning.wall_rows import field_tables_of_wall
 from tankcal.report.workbook.book import Book, about_saved
 from tankcal.report.workbook.look import Column as Cells
 from tankcal.report.workbook.tables import HEAD_ROW, set_widths
@@ -17,6 +18,7 @@ from tankcal.report.workbook.tables import HEAD_ROW, set_widths
 ONE_A_SHEET = (
     *("targets", "others", "stations", "photographs", "setups", "ties", "bases", "control"),
 )
+LANDSCAPE = ("ties", "setups", "circumferences", "runs", "tangents")
 EQUIPMENT = ("cameras", "instruments")
 SKETCHES = {"wall": sketches.wall, "stands": stands}
 FIRST = {"targets": ("point", "line", "row")}  # columns of a sheet before those of the paper
@@ -28,11 +30,23 @@ DPI, PT, ROOM_PT = 110, 72.0, 8.0
 def write(paper, path):
     """Write the workbook of a PlanPaper; the same plan gives the same bytes."""
     tables = field_tables(paper.prediction)
+    of_sheets = {name: tables[name] for name in ONE_A_SHEET if name in tables}
+    _write(paper, path, of_sheets, tables, SKETCHES)
+
+
+def write_of_wall(paper, path):
+    """Write the workbook of a WallPaper, a sheet for each table."""
+    tables = field_tables_of_wall(paper.plan)
+    of_sheets = {name: one for name, one in tables.items() if name not in EQUIPMENT}
+    _write(paper, path, of_sheets, tables, {})
+
+
+def _write(paper, path, of_sheets, tables, pictures):
     with Book(path, _about(paper.plan.job), paper.words, about="plan") as book:
-        _draw(book, paper)
-        for name in ONE_A_SHEET:
-            if name in tables:
-                _sheet(book, paper, name, {name: tables[name]})
+        if pictures:
+            _draw(book, paper, pictures)
+        for name, one in of_sheets.items():
+            _sheet(book, paper, name, {name: one})
         found = {name: tables[name] for name in EQUIPMENT if name in tables}
         if found:
             _sheet(book, paper, "equipment", found)
@@ -44,7 +58,7 @@ def _about(job):
 
 def _sheet(book, paper, code, tables):
     """Tables one below the other; a single one can be sorted, and its headings print again."""
-    sheet = book.sheet(code, landscape=code in ("ties", "setups"), tab="input")
+    sheet = book.sheet(code, landscape=code in LANDSCAPE, tab="input")
     columns = {
         name: [_column(paper, found, one) for one in _columns_of(name, of_paper)]
         for name, (found, of_paper) in tables.items()
@@ -67,10 +81,10 @@ def _columns_of(name, of_paper):
     return [*map(Column, first), *(one for one in of_paper if one.key not in first)]
 
 
-def _draw(book, paper):
+def _draw(book, paper, pictures):
     """The sketches, each in one high row."""
     sheet, row = book.sheet("sketches", tab="input"), HEAD_ROW
-    for name, draw in SKETCHES.items():
+    for name, draw in pictures.items():
         figure, picture = draw(paper), io.BytesIO()
         figure.savefig(picture, format="png", dpi=DPI, metadata={"Software": None})
         book.set_height(sheet, row, PT * figure.get_figheight() + ROOM_PT)

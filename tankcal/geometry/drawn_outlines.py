@@ -1,0 +1,67 @@
+"""Walls drawn at random from what is known of walls before they are measured (`components`)."""
+
+import numpy as np
+
+from tankcal.geometry.field.components import COMPONENTS, mode_shares, weld_columns
+from tankcal.geometry.girth import draw_waves, modes_of, nodes_of
+from tankcal.geometry.outlines import FULL_TURN
+
+NOTHING = 1e-12  # of the largest variance over the height: rounding
+
+
+def draw_departures(rng, sizes_m2, zeta, welds_rad, nominal_m):
+    """Departures of the courses of a wall from a cylinder, without a free radius or a centre.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    sizes_m2 : ndarray, shape (components,)
+        Variances of the components, m2.
+    zeta : ndarray, shape (k,)
+        Heights within each course, -1 to 1.
+    welds_rad : sequence of ndarray
+        Of each course, from the bottom up: the azimuths of its vertical welds that are known.
+    nominal_m : float
+        Radius of the tank, m.
+
+    Returns
+    -------
+    ndarray, shape (courses, k, n)
+        At n even azimuths clockwise from 0, m.
+
+    Examples
+    --------
+    >>> still = np.zeros(len(COMPONENTS))
+    >>> found = draw_departures(np.random.default_rng(1), still, np.zeros(2), [()] * 3, 6.5)
+    >>> found.shape[:2], float(np.abs(found).max())
+    ((3, 2), 0.0)
+    """
+    shares = mode_shares(modes_of(nominal_m), nominal_m)
+    count, courses = nodes_of(nominal_m), len(welds_rad)
+    azimuth = np.arange(count) * FULL_TURN / count
+    peaks = [weld_columns(azimuth, np.array(one, dtype=float), nominal_m).T for one in welds_rad]
+    found = np.zeros((courses, len(zeta), count))
+    for one, size in zip(COMPONENTS, sizes_m2, strict=True):
+        if not size:
+            continue
+        draws = 1 if one.common else courses
+        if one.shape == "weld":  # the same at all heights of a course
+            heights = [rng.normal(size=1 if one.common else len(columns)) for columns in peaks]
+            for course, columns in enumerate(peaks):
+                drawn = np.broadcast_to(heights[0 if one.common else course], len(columns))
+                found[course] += np.sqrt(size) * (drawn @ columns)
+            continue
+        up = np.sqrt(size) * _root(one.height_covariance(zeta, zeta))
+        if one.shape == "mean":
+            around = rng.normal(size=(draws, up.shape[1], 1))
+        else:
+            around = draw_waves(rng, shares[one.shape], (draws, up.shape[1]))
+        found += up @ around
+    return found
+
+
+def _root(covariance):
+    """(k, r) columns whose products are a covariance."""
+    values, vectors = np.linalg.eigh(covariance)
+    kept = values > NOTHING * values[-1]
+    return vectors[:, kept] * np.sqrt(values[kept])
