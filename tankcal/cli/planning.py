@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language, parse_count, parse_list, share
+from tankcal.cli.planned_counts import plan_holds
 from tankcal.cli.showing import (
     Progress,
     marks,
@@ -12,13 +13,7 @@ from tankcal.cli.showing import (
     speak,
     warn,
 )
-from tankcal.cli.wall_plans import (
-    plan_holds,
-    planned_setups,
-    wall_item,
-    wall_scatter,
-    wall_summary,
-)
+from tankcal.cli.wall_plans import wall_item, wall_scatter, wall_summary
 from tankcal.messages import message
 from tankcal.text.digits import fixed, format_significant, format_with_u
 
@@ -194,27 +189,21 @@ def _simulated(prediction, options, show):
     return draw(prediction, options.simulate, options.seed, options.blunders, show.part)
 
 
-def _bases(count):
-    if count == 1:
-        return message("plan_one_base", "{count} base of a stadia", count=count)
-    return message("plan_bases", "{count} bases of a stadia", count=count)
-
-
 def _summary(prediction):
     """What was planned, and how well points will be known."""
     from tankcal.planning.bases import by_ends
 
     plan = prediction.plan
     solution = prediction.predicted.adjusted.solution
-    parts = [
-        message("plan_photographs", "{count} photographs", count=len(plan.photos)),
-        planned_setups(len(plan.setups)),
-        message("plan_ties", "{count} ties", count=len(plan.ties)),
-        _bases(len(by_ends(plan.bases))),
-        message("plan_control", "{count} control points", count=len(plan.known)),
-        message("plan_targets", "{count} targets", count=len(plan.targets.names)),
-    ]
-    yield plan_holds(plan, parts)
+    counts = {
+        "photographs": len(plan.photos),
+        "setups": len(plan.setups),
+        "ties": len(plan.ties),
+        "bases": len(by_ends(plan.bases)),
+        "control": len(plan.known),
+        "targets": len(plan.targets.names),
+    }
+    yield plan_holds(plan, counts)
     yield message(
         "plan_network",
         "network: {rows} observations, {unknowns} unknowns, redundancy {dof}; mean sd of a target "
@@ -234,14 +223,14 @@ def _summary(prediction):
     if prediction.undetermined:
         yield message(
             "plan_not_determined",
-            "not determined: {count} points ({points})",
+            "points that are not determined: {count} ({points})",
             count=len(prediction.undetermined),
             points=_first(prediction.undetermined),
         )
     if prediction.weak:
         yield message(
             "plan_weak",
-            "weak: {count} points ({points})",
+            "weak points: {count} ({points})",
             count=len(prediction.weak),
             points=_first(prediction.weak),
         )
@@ -296,7 +285,7 @@ def _changes(effects):
         if not one.why:
             yield _effect(one)
     if len(effects) > SHOWN:
-        yield message("plan_more_changes", "  and {more} more changes", more=len(effects) - SHOWN)
+        yield message("plan_more_changes", "  more changes: {more}", more=len(effects) - SHOWN)
 
 
 def _effect(one):
@@ -372,7 +361,7 @@ def _design(path):
         yield message(
             "plan_smallest_worth",
             "  U/V {before} before, {after} after; cost {start_cost:g} before, {cost:g} after; "
-            "{tried} plans tried",
+            "plans tried: {tried}",
             **values,
             start_cost=path.start_cost,
             cost=path.cost,
@@ -380,7 +369,7 @@ def _design(path):
     else:
         yield message(
             "plan_smallest_without_cost",
-            "  U/V {before} before, {after} after; {tried} plans tried",
+            "  U/V {before} before, {after} after; plans tried: {tried}",
             **values,
         )
     if path.prediction.meets is False:
@@ -394,7 +383,7 @@ def _scatter(found):
         "plan_scatter",
         "{runs} simulated surveys, scatter over prediction: coordinates {ratio:.3f}, volume "
         "{volume_ratio:.3f} (known to {ratio_sd:.2g}); {aside:.1f} values set aside on "
-        "average, {failed} surveys without a solution",
+        "average, without a solution: {failed}",
         runs=found.runs,
         ratio=found.ratio,
         volume_ratio=found.volume_ratio,

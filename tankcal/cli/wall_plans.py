@@ -1,21 +1,11 @@
 """What the terminal says of a plan of straps, reference lines, wall hits, tangents or liquid."""
 
+from tankcal.cli.planned_counts import plan_holds
 from tankcal.cli.showing import marks
 from tankcal.messages import message
 from tankcal.text.digits import fixed, format_significant
 
 SCALES = ("meter_factor", "scale", "instrument_scale")  # that liquid tells something of
-
-
-def planned_setups(count):
-    """That many set-ups."""
-    return message("plan_setups", "{count} set-ups", count=count)
-
-
-def plan_holds(plan, parts):
-    """What a plan has, of what it may have."""
-    parts = [part for part in parts if part.values["count"]]
-    return message("plan_holds", "{tank}: {parts}", tank=plan.job.tank.id, parts=parts)
 
 
 def wall_summary(prediction):
@@ -24,17 +14,10 @@ def wall_summary(prediction):
 
     plan = prediction.plan
     has = survey_of(plan)
-    parts = [
-        message("plan_straps", "{count} readings of the tape", count=has.strap_readings),
-        message("plan_lines", "{count} reference lines", count=has.lines),
-        message("plan_offsets", "{count} offsets", count=has.offsets),
-        planned_setups(has.setups),
-        message("plan_hits", "{count} hits of the wall", count=has.hits),
-        message("plan_tangents", "{count} tangents", count=has.tangents),
-        message("plan_runs", "{count} runs of liquid", count=has.runs),
-        message("plan_batches", "{count} batches", count=has.batches),
-    ]
-    yield plan_holds(plan, parts)
+    counts = {"straps": has.strap_readings}
+    for kind in ("lines", "offsets", "setups", "hits", "tangents", "runs", "batches"):
+        counts[kind] = getattr(has, kind)
+    yield plan_holds(plan, counts)
     for one in prediction.courses:
         yield message(
             "plan_course_radius",

@@ -48,8 +48,8 @@ def _unseen(prediction):
         return ()
     text = message(
         "plan_targets_lost",
-        "{count} of {all} targets are not determined, because they are seen from too few "
-        "places: {points}",
+        "targets that are not determined, because they are seen from too few places: {count} of "
+        "{all} ({points})",
         count=len(lost),
         all=len(targets),
         points=list_some(lost, SHOWN),
@@ -74,8 +74,8 @@ def idle_ties(plan, points):
         return ()
     text = message(
         "plan_ties_idle",
-        "{count} of {all} tapes, bases, height differences and plumb lines have no effect, because "
-        "one of their ends is not determined: {ties}",
+        "tapes, bases, height differences and plumb lines without effect, because one of their "
+        "ends is not determined: {count} of {all}, {ties}",
         count=len(idle),
         all=len(ties),
         ties=list_some(idle, SHOWN),

@@ -227,8 +227,8 @@ def _check_rows(plan, pattern, log):
     if len(close):
         text = message(
             "plan_targets_on_welds",
-            "{count} rows of targets are nearer than {clearance_mm:g} mm to a horizontal "
-            "weld: {heights} m; is that intended?",
+            "rows of targets nearer than {clearance_mm:g} mm to a horizontal weld ({count}): "
+            "{heights} m; is that intended?",
             count=len(close),
             clearance_mm=1000 * clearance,
             heights=list_some([f"{height:g}" for height in close], SHOWN),

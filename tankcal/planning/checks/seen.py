@@ -51,11 +51,11 @@ def refuse_blind(plan, seen):
 def _seen(count, targets):
     if not count:
         return _nothing()
-    return (
-        message("plan_points_only", "{count} points only", count=count)
-        if targets
-        else message("plan_no_target", "no target (other points: {count})", count=count)
-    )
+    if not targets:
+        return message("plan_no_target", "no target (other points: {count})", count=count)
+    if count == 1:
+        return message("plan_one_point_only", "{count} point only", count=count)
+    return message("plan_points_only", "{count} points only", count=count)
 
 
 def _nothing():

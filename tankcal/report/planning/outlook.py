@@ -189,7 +189,9 @@ def _weak(paper):
 def _why(paper, one):
     if one.undetermined:
         return {0: "why_unseen", 1: "why_one_ray"}.get(one.rays, "why_undetermined")
-    return "why_few_rays" if one.rays < paper.fewest_rays else "why_large_sd"
+    if one.rays >= paper.fewest_rays:
+        return "why_large_sd"
+    return "why_one_ray" if one.rays == 1 else "why_few_rays"
 
 
 def _sections(found):
