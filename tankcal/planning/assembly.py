@@ -7,7 +7,8 @@ import numpy as np
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.planning.bases import bases_of
 from tankcal.planning.given import PLAN_FILE
-from tankcal.planning.model import Box, Known, Limits, Pillar, Plan, Tie
+from tankcal.planning.model import Known, Limits, Plan, Tie
+from tankcal.planning.obstacles import obstacles_of
 from tankcal.planning.patterns import photographs_of, setups_of, shell_of, tape_of, targets_of
 
 INCIDENCE_DEG, RAYS = 70.0, 3
@@ -51,7 +52,7 @@ def assemble_plan(job, given, bars, folder):
         known=tuple(one for one in known if np.isfinite(one.sd_m).any()),
         extra=extra,
         facing=facing,
-        obstacles=tuple(_obstacle(one) for one in given.repeated["obstacles"]),
+        obstacles=obstacles_of(given),
         limits=limits_of(given.single["limits"]),
         bases=bases_of(given.stadia, bars),
         bars={
@@ -96,16 +97,6 @@ def _known(control, places):
         nominal = places.get(name, np.full(3, np.nan))
         found.append(Known(name, np.where(np.isnan(xyz), nominal, xyz), sd))
     return found
-
-
-def _obstacle(given):
-    if given["kind"] == "box":
-        corners = np.array([given["from_m"], given["to_m"]])
-        return Box(corners.min(axis=0), corners.max(axis=0), given["name"])
-    return Pillar(
-        np.array(given["axis_m"]), given["radius_m"], given["low_m"], given["high_m"],
-        given["name"],
-    )  # fmt: skip
 
 
 def limits_of(given):

@@ -109,7 +109,8 @@ def _wall_plan(raw, values, tables, given, folder, log):
     log.stop_if_problems()
     limits = limits_of(given.single["limits"])
     name = folder.resolve().name
-    return replace(wall_plan_of(raw, values, tables, given, limits, name), warnings=told)
+    plan = wall_plan_of(raw, values, tables, given, limits, name)
+    return replace(plan, warnings=(*told, *plan.warnings))
 
 
 def _check_kind(raw, given, log):

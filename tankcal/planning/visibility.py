@@ -1,15 +1,12 @@
-"""What is seen from where: inside the frame, not too obliquely, nothing in the way.
-
-A line of sight from S to X is cut by a box when the slabs of its three axes overlap along it, by an
-upright cylinder when a part of it within the radius lies between bottom and top.
-"""
+"""What is seen from where: inside the frame, not too obliquely, nothing in the way."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from tankcal.camera.model import distort_image_points
-from tankcal.planning.model import Box, Pillar
+from tankcal.planning.model import Pillar
+from tankcal.planning.obstacles import find_hidden
 
 FEWEST_READINGS = 3
 AHEAD_M = 0.1  # nearest depth of a point before a camera
@@ -126,41 +123,3 @@ def find_in_sight(plan, place_m, xyz_m, normals):
     for obstacle in plan.obstacles:
         seen &= ~find_hidden(obstacle, place_m, xyz_m)
     return seen
-
-
-def find_hidden(obstacle, place_m, xyz_m):
-    """(n,) True where the line from a place (3,) to a point (n, 3) meets a Box or a Pillar."""
-    along = xyz_m - place_m
-    if isinstance(obstacle, Box):
-        first, last = _in_slabs(place_m, along, obstacle.low_m, obstacle.high_m)
-    else:
-        low, high = np.full(3, -np.inf), np.full(3, np.inf)
-        low[2], high[2] = obstacle.low_m, obstacle.high_m
-        first, last = _in_slabs(place_m, along, low, high)
-        near, far = _in_round(place_m[:2] - obstacle.axis_m, along[:, :2], obstacle.radius_m)
-        first, last = np.maximum(first, near), np.minimum(last, far)
-    return np.maximum(first, 0.0) < np.minimum(last, 1.0)
-
-
-def _in_slabs(place, along, low, high):
-    """Parts of the line (n,), (n,) between which it is within the slabs of three axes."""
-    still = along == 0
-    step = np.where(still, 1.0, along)
-    one, two = (low - place) / step, (high - place) / step
-    inside = (place > low) & (place < high)
-    first = np.where(still, np.where(inside, -np.inf, np.inf), np.minimum(one, two))
-    last = np.where(still, np.where(inside, np.inf, -np.inf), np.maximum(one, two))
-    return first.max(axis=1), last.min(axis=1)
-
-
-def _in_round(place, along, radius):
-    """The same within a circle: |place + t along| < radius."""
-    a, b = np.einsum("ni,ni->n", along, along), along @ place
-    c = place @ place - radius**2
-    with np.errstate(invalid="ignore", divide="ignore"):
-        root = np.sqrt(b * b - a * c)
-        near, far = (-b - root) / a, (-b + root) / a
-    near = np.where(a > 0, near, -np.inf if c < 0 else np.inf)
-    far = np.where(a > 0, far, np.inf if c < 0 else -np.inf)
-    misses = np.isnan(near)
-    return np.where(misses, np.inf, near), np.where(misses, -np.inf, far)

@@ -8,6 +8,7 @@ from tankcal.job.contract.stadia import LEAST
 from tankcal.job.tables import nearest
 from tankcal.messages import message
 from tankcal.planning.bases import STADIA_FILE, base_m
+from tankcal.planning.obstacles import line_cut
 from tankcal.planning.visibility import GRAZE_M, find_in_sight
 from tankcal.survey.stadia import distance_of_angle_m
 
@@ -68,12 +69,7 @@ def _out_of_reach(plan, one):
         )
     here, there = plan.points[one.setup], plan.points[one.to]
     if not find_in_sight(plan, here, there[None], np.full((1, 3), np.nan))[0]:
-        return message(
-            "plan_base_hidden",
-            "the line from {one} to {other} is cut by the tank or an obstacle; expected it free",
-            one=one.setup,
-            other=one.to,
-        )
+        return line_cut(one.setup, one.to)
     ends = _ends(here, there, length)
     off = np.hypot(*(ends - plan.shell.axis_m).T) - plan.shell.radius_m
     is_level = plan.shell.low_m <= there[2] <= plan.shell.high_m

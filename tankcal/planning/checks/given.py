@@ -6,6 +6,7 @@ from tankcal.messages import message
 from tankcal.pipeline.survey_warnings import ADVISED_POINTS, FEWEST_POINTS
 from tankcal.planning.fields import check_form, no_such_name
 from tankcal.planning.given import PLAN_FILE
+from tankcal.planning.obstacles import check_obstacles
 from tankcal.planning.units import warn_of_units
 
 UNFIT = {  # kinds of instruments that cannot be meant
@@ -43,7 +44,7 @@ def check_given(values, registers, given, raw, log):
                     "expected one of distance_m (from the wall) and radius_m (from the axis)",
                 )
                 one.tell(log.problem, "distance_m", expected)
-    _check_obstacles(given, log)
+    check_obstacles(given, log)
     _check_tapes(given, log)
     _check_tables(given, log)
     _check_accuracies(values, given, raw, log)
@@ -88,40 +89,6 @@ def _check_pattern(pattern, log):
         )
         pattern.tell(log.problem, "levels", expected)
     check_form(pattern, log)
-
-
-def _check_obstacles(given, log):
-    needed = {"box": {"from_m": 3, "to_m": 3}, "cylinder": {"axis_m": 2}}
-    numbers = {"box": (), "cylinder": ("radius_m", "low_m", "high_m")}
-    for one in given.repeated["obstacles"]:
-        for key, count in needed.get(one["kind"], {}).items():
-            if not one.is_refused(key) and len(one[key] or ()) != count:
-                one.tell(
-                    log.problem,
-                    key,
-                    message("plan_numbers_metres", "expected {count} numbers, metres", count=count),
-                )
-        for key in numbers.get(one["kind"], ()):
-            if key not in one.filled:
-                one.tell(
-                    log.problem,
-                    key,
-                    message("plan_number_metres", "missing; expected a number, metres"),
-                )
-        if None not in (one["low_m"], one["high_m"]) and one["high_m"] <= one["low_m"]:
-            expected = message(
-                "plan_high_low",
-                "found {high:g}; expected more than low_m, {low:g}",
-                high=one["high_m"],
-                low=one["low_m"],
-            )
-            one.tell(log.problem, "high_m", expected)
-        if any(a == b for a, b in zip(one["from_m"] or (), one["to_m"] or (), strict=False)):
-            expected = message(
-                "plan_flat_box",
-                "in a plane with from_m; expected a corner that differs in x, y and z",
-            )
-            one.tell(log.problem, "to_m", expected)
 
 
 def _check_tapes(given, log):

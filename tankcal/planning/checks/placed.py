@@ -8,10 +8,11 @@ from tankcal.messages import join_with_and, list_some, message
 from tankcal.planning.checks.bases import check_bases
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.model import Pillar
+from tankcal.planning.obstacles import find_hidden, in_an_obstacle, misplaced
 from tankcal.planning.patterns import TOUCH_M, plate_m
 from tankcal.planning.places import joints_m
 from tankcal.planning.units import warn_of_places
-from tankcal.planning.visibility import GRAZE_M, find_hidden
+from tankcal.planning.visibility import GRAZE_M
 
 # Ties and control: names that are there, lines that nothing cuts, control at its place.
 
@@ -316,14 +317,7 @@ def _check_stations(plan, stands, log):
         if why and one.place not in told:
             told.add(one.place)
             file, row, name = one.place
-            log.problem(
-                file,
-                message(
-                    "plan_misplaced", "station {station} {why}", station=_station(one), why=why
-                ),
-                row,
-                name,
-            )
+            log.problem(file, misplaced(_station(one), why), row, name)
 
 
 def _station(one):
@@ -369,16 +363,4 @@ def _misplaced(plan, xyz):
             radius=shell.radius_m,
             z=xyz[2],
         )
-    for obstacle in plan.obstacles:
-        if _within(obstacle, xyz):
-            return message(
-                "plan_in_an_obstacle", "stands in the obstacle {obstacle}", obstacle=obstacle.name
-            )
-    return ""
-
-
-def _within(obstacle, xyz):
-    if hasattr(obstacle, "radius_m"):
-        near = np.hypot(*(xyz[:2] - obstacle.axis_m)) < obstacle.radius_m
-        return bool(near and obstacle.low_m < xyz[2] < obstacle.high_m)
-    return bool(((xyz > obstacle.low_m) & (xyz < obstacle.high_m)).all())
+    return in_an_obstacle(plan.obstacles, xyz)

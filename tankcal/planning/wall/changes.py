@@ -43,23 +43,19 @@ def _filling(plan):
 
 def wall_count(plan):
     """{item: how many of it a WallPlan has}, of those that cost."""
-    design = plan.design
-    lines = design.lines
-    levels = 0 if lines is None else len(lines.at_percent) * len(plan.job.courses)
-    read = 0 if lines is None else lines.count * levels * lines.faces * lines.readings
-    read += sum(one.readings for one in design.straps)
-    read += sum(
-        one.setups * one.hits * len(one.at_percent) * len(one.courses) for one in design.hits
+    design, job, ring = plan.design, plan.job, plan.design.tangents
+    read = (
+        job.strapping and job.strapping.straps,
+        job.lines and job.lines.offsets,
+        job.hits,
+        job.tangents,
     )
-    ring = design.tangents
-    if ring is not None:  # both limbs
-        read += 2 * ring.stations * len(ring.at_percent) * len(plan.job.courses) * ring.readings
     return {
         "strap": len(design.straps),
-        "line": 0 if lines is None else lines.count,
+        "line": 0 if job.lines is None else len(job.lines.lines),
         "setup": sum(one.setups for one in design.hits) + (0 if ring is None else ring.stations),
         "base": 0 if ring is None or ring.bar is None else 2 * ring.stations,
-        "reading": read,
+        "reading": sum(len(one) for one in read if one is not None),
         "run": len(design.runs),
         "batch": sum(one.batches for one in design.runs),
     }

@@ -14,9 +14,11 @@ from tankcal.job.checks.liquid import MOST_ROWS
 from tankcal.job.checks.strapping import MOST_STRAPS
 from tankcal.job.checks.tangents import MOST_TANGENTS
 from tankcal.job.tables import Table
+from tankcal.planning.obstacles import find_hidden
 from tankcal.planning.wall.filling import rows_of_runs
 from tankcal.survey.stadia import angle_of_distance_rad
 
+OFF_WALL_M = 0.2  # of a reference line
 USUAL_BAR_M = 2.0  # where nobody describes it, which the job tells
 STEEPEST = np.radians(55.0)  # incidence in plan, of a set-up that says nothing of what it sees
 TIE_HEIGHTS_M = (0.4, 1.4, 2.4)  # above the instrument's foot: of targets that set-ups share
@@ -30,12 +32,15 @@ class Foreseen:
     design  Design              courses  ((name, height_m), ...) from the bottom up
     radius_m  nominal           bottom_m  z of the bottom     zero_m  of the table above it
     holds     function of a dip that gives m3, roughly; None: nothing is filled in
+    obstacles  Box and Pillar: sights that they cut are left out
     bars      {name: length, m} of stadias
     """
 
-    def __init__(self, design, courses, radius_m, bottom_m, zero_m, holds=None, bars=None):
+    def __init__(
+        self, design, courses, radius_m, bottom_m, zero_m, holds=None, obstacles=(), bars=None
+    ):
         self.design, self.radius_m, self.holds = design, radius_m, holds
-        self.bars = bars or {}
+        self.bars, self.obstacles = bars or {}, obstacles
         self.bottom_m, self.zero_m = bottom_m, zero_m
         self.foot, foot = {}, 0.0
         for name, height in courses:
@@ -85,29 +90,54 @@ class Foreseen:
             for _ in range(one.readings):
                 yield row
 
-    def _lines(self):
-        lines = self.design.lines
+    def _sees(self, place, there):
+        """Whether no obstacle is between two places (3,)."""
+        there = np.array([there])
+        return not any(find_hidden(one, place, there)[0] for one in self.obstacles)
+
+    def _lines_in_sight(self):
+        """(name, azimuth in degrees, [(course, percent) that is seen along it]) of each line.
+
+        A line that does not see the reference level tells nothing.
+        """
+        lines, (reference, levels) = self.design.lines, self._levels_of_lines()
+        off = self.radius_m + (-OFF_WALL_M if lines.side == "inside" else OFF_WALL_M)
         for number in range(lines.count):
             azimuth = (lines.first_deg + 360 * number / lines.count) % 360
+            x, y = off * np.sin(np.radians(azimuth)), off * np.cos(np.radians(azimuth))
+            foot = np.array([x, y, self.bottom_m])
+            seen = [one for one in levels if self._sees(foot, [x, y, foot[2] + self._height(*one)])]
+            if reference in seen:
+                yield str(number + 1), azimuth, seen
+
+    def _lines(self):
+        lines = self.design.lines
+        for name, azimuth, _ in self._lines_in_sight():
             yield {
-                "line": str(number + 1),
+                "line": name,
                 "azimuth_deg": azimuth,
                 "instrument": lines.instrument,
                 "side": lines.side,
             }
 
-    def _offsets(self):
-        """The level of the first strap that lies on one is the reference: then U is the least."""
+    def _levels_of_lines(self):
+        """The reference level of the lines, and all (course, percent) from the bottom up.
+
+        The reference is that of the first strap that lies on one: then U is the least.
+        """
         lines = self.design.lines
         levels = [(course, percent) for course in self.foot for percent in lines.at_percent]
         strapped = [(one.course, one.at_percent) for one in self.design.straps]
         of_course = [level for level in levels if level[0] in {name for name, _ in strapped}]
-        reference = next((one for one in strapped if one in levels), (of_course or levels)[0])
-        for line in range(lines.count):
+        return next((one for one in strapped if one in levels), (of_course or levels)[0]), levels
+
+    def _offsets(self):
+        lines, (reference, _) = self.design.lines, self._levels_of_lines()
+        for name, _, seen in self._lines_in_sight():
             for face in range(1, lines.faces + 1):
-                for course, percent in levels:
+                for course, percent in seen:
                     row = {
-                        "line": str(line + 1),
+                        "line": name,
                         "course": course,
                         "level_m": self._level(course, percent),
                         "offset_mm": 200.0,
@@ -151,7 +181,8 @@ class Foreseen:
                     z = self.bottom_m + self._height(course, percent)
                     for aim in aims:
                         there = [self.radius_m * np.sin(aim), self.radius_m * np.cos(aim), z]
-                        yield {"setup": name, "course": course} | _sight(station, there)
+                        if self._sees(station, there):
+                            yield {"setup": name, "course": course} | _sight(station, there)
 
     def _control_readings(self):
         """All control targets of a set-up, round by round; where they stand the crew will see."""
@@ -196,6 +227,8 @@ class Foreseen:
                 for percent in ring.at_percent:
                     z = self.bottom_m + self._height(course, percent)
                     for side in ("left", "right"):
+                        if not self._sees(there, self._limb(there, z, side)):
+                            continue
                         row = {
                             "setup": name,
                             "course": course,
@@ -206,6 +239,27 @@ class Foreseen:
                         row["s_arcsec"] = ring.sd_arcsec
                         for _ in range(ring.readings):
                             yield row
+
+    def _limb(self, there, z, side):
+        """(3,) place that a sight from a station touches at a height."""
+        azimuth, length = limb_of_circle(there[:2], self.radius_m, is_right=side == "right")
+        x, y = there[:2] + length * np.array([np.sin(azimuth), np.cos(azimuth)])
+        return np.array([x, y, z])
+
+    def stands(self):
+        """(name, place (3,) of the instrument) of each set-up of hits, each station of tangents."""
+        for ring, name, turn in self._rings():
+            yield name, np.append(self._place(ring, turn), self.bottom_m + ring.height_m)
+        if self.design.tangents is not None:
+            yield from self._stands()
+
+    def lines_cut(self):
+        """(name, name of the next) stations of a traverse that obstacles stand between."""
+        stands = [] if self.design.tangents is None else list(self._stands())
+        for k, (name, there) in enumerate(stands):
+            after, beside = stands[(k + 1) % len(stands)]
+            if not self._sees(there, beside):
+                yield name, after
 
     def _traverse(self):
         """{table: rows} of the set-ups, their stations, and the readings between neighbours."""

@@ -204,6 +204,8 @@ class WallPlan:
         Relative standard deviation of the run effect that runs are to show.
     holds : callable or None
         Function of a dip, m, that gives m3, roughly: of a tank that will be filled.
+    obstacles : tuple of Box or Pillar
+        That cut lines of sight.
     folder : str
     given : RawJob
         What stands in the folder, as it was read.
@@ -218,6 +220,7 @@ class WallPlan:
     dips_m: tuple = ()
     expected_run: float | None = None
     holds: object = None
+    obstacles: tuple = ()
     folder: str = ""
     given: RawJob | None = None
     warnings: tuple = ()

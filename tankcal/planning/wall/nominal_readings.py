@@ -12,6 +12,7 @@ import numpy as np
 from tankcal.geometry.field.information import expect_amplitudes
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.surveying import find_survey
+from tankcal.planning.wall.foreseen_tables import OFF_WALL_M
 from tankcal.planning.wall.nominal_filling import with_nominal_batches
 from tankcal.planning.wall.reading_errors import EXACT
 from tankcal.planning.wall.tank_walls import RoundWall, plates_of
@@ -19,7 +20,6 @@ from tankcal.survey.readings import read_distance_m
 from tankcal.survey.sighting import bias_by_incidence, rays
 from tankcal.survey.strapping import reduce_straps
 
-OFFSET_M = 0.2  # of the lowest wall from a line
 CLOSE_M, ROUNDS = 1e-12, 20
 MILLIMETRES = 3  # decimals of heights of hits that are one level
 
@@ -113,7 +113,7 @@ def _plumbed(job, wall, errors):
         radius = float(wall.radius_m(*place, inside=line.inside))
         away = radius - wall.nominal_m if line.inside else constant - radius
         leans = given.by_collimation_m(one) * errors.collimation_rad(plummet)
-        away += OFFSET_M + (leans if line.inside else -leans)
+        away += OFF_WALL_M + (leans if line.inside else -leans)
         away /= (1 + plummet.correction) * (1 + errors.scale(plummet))
         found.append(replace(one, offset_m=away + float(off)))
     return replace(given, offsets=tuple(found))

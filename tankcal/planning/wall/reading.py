@@ -19,6 +19,7 @@ from tankcal.job.tables import Log, Value
 from tankcal.messages import message
 from tankcal.planning.fields import check_form, no_such_name, too_many_sections
 from tankcal.planning.given import PLAN_FILE
+from tankcal.planning.obstacles import check_obstacles, obstacles_of
 from tankcal.planning.wall.contract import MEASURING
 from tankcal.planning.wall.filling import check_runs, runs_of
 from tankcal.planning.wall.foreseen_tables import Foreseen
@@ -35,6 +36,7 @@ from tankcal.planning.wall.model import (
     evenness_of_limbs,
 )
 from tankcal.planning.wall.nominal_readings import with_nominal_readings
+from tankcal.planning.wall.obstructed import refuse_cut, warnings_of_obstacles
 from tankcal.planning.wall.telling import told_of_plan
 
 CLEAR_M, MOST_SECTIONS = 0.5, 50
@@ -43,7 +45,7 @@ UNEVEN = 0.15  # of limbs: nearer to each other than that, they are the same pla
 USUAL_HEIGHT_M = 1.6  # of an instrument above the bottom
 SELDOM_MIN = 30.0  # between readings of control targets
 FEWEST_AZIMUTHS = 3  # that a circle goes through
-OF_POINTS = ("pattern", "photo_rings", "setup_rings", "tapes", "obstacles")
+OF_POINTS = ("pattern", "photo_rings", "setup_rings", "tapes")
 
 
 def is_wall_plan(own):
@@ -79,6 +81,7 @@ def check_sections(given, courses, nominal_m, raw, log):
     if courses:
         _check_hits(given.repeated["hits"], courses, log)
     check_form(given.single["wall"], log)
+    check_obstacles(given, log)
     _check_lines_and_ties(given, log)
     _check_tangents(given, nominal_m, log)
     check_runs(given, raw.settings.get("liquid", {}).get("run_ppm") is not None, log)
@@ -392,7 +395,13 @@ def wall_plan_of(raw, values, tables, given, limits, folder):
     amplitudes = assumed_amplitudes(*sizes)
     bottom, diameter = values["datum"]["bottom_z_m"], values["tank"]["nominal_diameter_m"]
     zero = 0.0 if bottom is None else zero_z(values) - bottom
-    tank = (courses, diameter and diameter / 2, bottom, zero, holds)
+    obstacles = () if bottom is None else obstacles_of(given)
+    tank = (courses, diameter and diameter / 2, bottom, zero, holds, obstacles)
+    warnings = ()
+    if obstacles:
+        foreseen = Foreseen(design, *tank, bars=lengths_of_bars(raw))
+        refuse_cut(foreseen, _rows_of(given))
+        warnings = warnings_of_obstacles(foreseen, _rows_of(given))
     ppm = filling["expected_run_ppm"]
     expected = None if ppm is None else ppm / 1e6
     return WallPlan(
@@ -404,8 +413,10 @@ def wall_plan_of(raw, values, tables, given, limits, folder):
         dips_m=tuple(sorted(set(filling["dips_m"] or ()))),
         expected_run=expected,
         holds=holds,
+        obstacles=obstacles,
         folder=folder,
         given=raw,
+        warnings=warnings,
     )
 
 
@@ -425,7 +436,8 @@ def changed(plan, design=None, raw=None):
 
 def tables_of(plan):
     """{name: Table} of what will be read, whatever stands as its value."""
-    return Foreseen(plan.design, *_tank_of(plan), lengths_of_bars(plan.given)).tables()
+    bars = lengths_of_bars(plan.given)
+    return Foreseen(plan.design, *_tank_of(plan), bars=bars).tables()
 
 
 def lengths_of_bars(raw):
@@ -446,18 +458,19 @@ def _tank_of(plan):
     courses = tuple((one.name, one.height_m) for one in job.courses)
     datum, diameter = job.datum, job.tank.nominal_diameter_m
     radius, bottom = diameter and diameter / 2, datum.bottom_z_m
-    return courses, radius, bottom, 0.0 if bottom is None else datum.plate_level_m, plan.holds
+    zero = 0.0 if bottom is None else datum.plate_level_m
+    return courses, radius, bottom, zero, plan.holds, plan.obstacles
 
 
 def job_of_design(raw, design, tank, expected, rows=None):
     """The Job of a RawJob and the tables that a `Design` makes, with the readings foreseen.
 
-    tank      courses, radius, z of the bottom, zero of the table above it, what it holds: as
-              `Foreseen` takes them
+    tank      courses, radius, z of the bottom, zero of the table above it, what it holds, what
+              stands in the way: as `Foreseen` takes them
     expected  amplitudes of the wall, and the run effect, as `with_nominal_readings` takes them
     rows      {section: row of plan.toml}, for what is told
     """
-    made = Foreseen(design, *tank, lengths_of_bars(raw)).tables()
+    made = Foreseen(design, *tank, bars=lengths_of_bars(raw)).tables()
     settings = dict(raw.settings)
     datum = datum_of(design)
     if datum is not None:

@@ -121,32 +121,37 @@ def _offsets(plan):
     """Each level once, with how often it is read on each line."""
     given, feet, rows = plan.job.lines, _feet(plan), {}
     for one in () if given is None else given.offsets:
-        row = rows.setdefault(
+        rows.setdefault(
             (one.course, one.level_m),
             {
                 "course": one.course,
                 "height_in_course_m": one.level_m - feet[one.course],
                 "level_m": one.level_m,
                 "reference": "reference" if one.reference else None,
-                "readings": 0,
+                "readings": plan.design.lines.faces * plan.design.lines.readings,
                 "sd_m": one.sd_m,
             },
         )
-        row["readings"] += 1
-    count = 1 if given is None else len(given.lines)
-    return [row | {"readings": row["readings"] // count} for row in rows.values()]
+    return list(rows.values())
 
 
 def _offset_readings(plan):
     """Each level on each line, as often as one face reads it."""
-    given, lines = plan.job.lines, plan.design.lines
-    levels = _offsets(plan)
-    return [
-        level | {"line": name, "reading": number + 1}
-        for name in ({} if given is None else given.lines)
-        for level in levels
-        for number in range(lines.readings)
-    ]
+    given, seen, rows = plan.job.lines, {}, []
+    for one in () if given is None else given.offsets:
+        if one.face == 1:
+            place = one.line, one.course, one.level_m
+            seen[place] = seen.get(place, 0) + 1
+            rows.append(
+                {
+                    "line": one.line,
+                    "course": one.course,
+                    "level_m": one.level_m,
+                    "reference": "reference" if one.reference else None,
+                    "reading": seen[place],
+                }
+            )
+    return rows
 
 
 def _columns_of_offsets(plan):
