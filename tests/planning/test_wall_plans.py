@@ -31,6 +31,7 @@ from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import compute_table
 from tankcal.pipeline.tangent_wall import touch_wall
 from tankcal.planning import load_plan, predict, smallest, what_helps
+from tankcal.planning.wall.changes import instruments_read, wall_changes_of
 from tankcal.planning.wall.foreseen_tables import tangent_sight
 from tankcal.planning.wall.model import PlannedStrap, even_radius_m, evenness_of_limbs
 from tankcal.planning.wall.nominal_readings import with_nominal_readings
@@ -39,7 +40,7 @@ from tankcal.planning.wall.reading import changed, tables_of
 from tankcal.record.wall_plan import WALL_PLAN, plain_of_wall
 from tankcal.report.planning import wall_files, workbook
 from tankcal.report.planning.wall_files import form_of_wall
-from tankcal.report.planning.wall_paper import WallPaper
+from tankcal.report.planning.wall_paper import WallPaper, wall_outlook, wall_sheets
 from tankcal.report.planning.wall_rows import field_tables_of_wall
 
 STRAPS_ALONE = (
@@ -588,3 +589,27 @@ def test_offsets_have_a_row_for_each_level_of_each_line(tmp_path):
     rows, columns = field_tables_of_wall(load_plan(LINES))["offset_readings"]
     assert len(rows) * 2 == len(load_plan(LINES).job.lines.offsets)
     assert {"face_1", "face_2"} <= {one.key for one in columns}
+
+
+def test_only_instruments_that_read_something_are_certified_anew(tmp_path):
+    """A tape that nothing is strapped with would not help; a master does, and is taken along."""
+    plan = load_plan(TANGENTS)  # its instruments.toml has a tape, too
+    named = {name for _, item, name, _ in wall_changes_of(plan) if item == "certificate"}
+    assert named == {"TS"}
+    assert instruments_read(plan.job) == {"TS"}
+    assert instruments_read(load_plan(LINES).job) == {"T-12", "ZL-3"}
+    tape = replace(load_plan(LINES).job.strapping.tapes[0], master="M-1")
+    job = load_plan(LINES).job
+    job = replace(job, strapping=replace(job.strapping, tapes=(tape,)))
+    assert instruments_read(job) == {"T-12", "ZL-3", "M-1"}
+
+
+@pytest.mark.parametrize(("faces", "told"), [(2, True), (1, False)])
+def test_field_sheets_tell_of_the_other_face_where_it_is_read(tmp_path, faces, told):
+    folder = plan_of(tmp_path / "plan", LINES, ("faces = 2", f"faces = {faces}"))
+    path = folder / "instruments.toml"
+    path.write_text(path.read_text(encoding="utf-8") + "u_collimation_arcsec = 10\n")
+    paper = WallPaper(predict(load_plan(folder)), "en")
+    text = " ".join(str(block.data) for block in wall_sheets(paper))
+    assert ("other face" in text) == told
+    assert "Hits" not in str([block.data for block in wall_outlook(paper)])

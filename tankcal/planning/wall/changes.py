@@ -199,18 +199,34 @@ def _even_ring_m(plan, stations):
 
 
 def _certificates(plan):
-    """Instruments whose certificate would be twice as good."""
-    register = plan.given.registers.get("instruments")
+    """Instruments that read something whose certificate would be twice as good."""
+    register, used = plan.given.registers.get("instruments"), instruments_read(plan.job)
     for name, entry in {} if register is None else register.entries.items():
         given = {
             key: entry[key].raw / 2
             for key in BETTER
             if key in entry and isinstance(entry[key].raw, int | float) and entry[key].raw > 0
         }
-        if given:
+        if given and name in used:
             yield (
                 "repeat",
                 "certificate",
                 name,
                 lambda name=name, given=given: changed(plan, raw=plan.with_instrument(name, given)),
             )
+
+
+def instruments_read(job):
+    """Names of the instruments of a Job that read something, and of the masters of its tapes."""
+    found = set()
+    if job.strapping is not None:
+        read = {one.tape for one in job.strapping.straps}
+        found |= read | {one.master for one in job.strapping.tapes if one.name in read}
+    if job.lines is not None:
+        found |= {one.instrument for one in job.lines.lines.values()}
+    for sighted in (job.hits, job.tangents):
+        if sighted is not None:
+            found |= set(sighted.instrument)
+    for given in () if job.measurements is None else job.measurements.readings:
+        found |= set(given.instrument or ())
+    return found - {"", None}

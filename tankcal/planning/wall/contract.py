@@ -77,7 +77,7 @@ HITS = (
     _INSTRUMENT,
 )
 TIES = (
-    count("targets", message("plan_note_ties", "that neighbours share"), True, 20),
+    count("targets", message("plan_note_ties", "how many targets neighbours share"), True, 20),
     *(one for one in RANGING if one.name in ("s_mm", "s_arcsec")),
 )
 CONTROL_TARGETS = (

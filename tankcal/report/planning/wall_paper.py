@@ -74,7 +74,8 @@ def _as_assumed(paper):
 def _courses(paper):
     rows = courses_of(paper.prediction)
     before = [paper.paragraph("courses_before_liquid")] if paper.plan.design.runs else []
-    table = paper.table("courses", rows, COURSES)
+    columns = [one for one in COURSES if any(row[one.key] is not None for row in rows)]
+    table = paper.table("courses", rows, columns)
     return [paper.heading("courses"), *before, table] if rows else []
 
 
@@ -144,6 +145,8 @@ def wall_sheets(paper):
             found.append(paper.heading(heads[name]))
         if name in ABOUT:
             found.append(paper.paragraph(ABOUT[name]))
+        if name == "sight_lines" and paper.plan.design.lines.faces > 1:
+            found.append(paper.paragraph("wall_faces"))
         found += sheet_of_runs(paper, one) if name == "runs" else [_table(paper, name, one)]
     return [
         *found,

@@ -4,6 +4,7 @@ import datetime
 
 import numpy as np
 
+from tankcal.planning.wall.changes import instruments_read
 from tankcal.planning.wall.nominal_readings import place_stations
 from tankcal.planning.wall.reading import lengths_of_bars, tables_of
 from tankcal.report.plain import Column
@@ -167,7 +168,7 @@ def _columns_of_offsets(plan):
 def _instruments(plan):
     """Instruments that read something, and the masters of tapes, as instruments.toml has them."""
     register = plan.given.registers.get("instruments")
-    used, rows = _used(plan.job), []
+    used, rows = instruments_read(plan.job), []
     for name, entry in {} if register is None else register.entries.items():
         given = {key: one.raw for key, one in entry.items()}
         scale = given.get("u_scale_ppm")
@@ -181,22 +182,6 @@ def _instruments(plan):
                 }
             )
     return rows
-
-
-def _used(job):
-    """Names of the instruments of a Job that read something."""
-    found = set()
-    if job.strapping is not None:
-        read = {one.tape for one in job.strapping.straps}
-        found |= read | {one.master for one in job.strapping.tapes if one.name in read}
-    if job.lines is not None:
-        found |= {one.instrument for one in job.lines.lines.values()}
-    for sighted in (job.hits, job.tangents):
-        if sighted is not None:
-            found |= set(sighted.instrument)
-    for given in () if job.measurements is None else job.measurements.readings:
-        found |= set(given.instrument or ())
-    return found
 
 
 def _setups(plan):
