@@ -31,6 +31,8 @@ from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import compute_table
 from tankcal.pipeline.tangent_wall import touch_wall
 from tankcal.planning import load_plan, predict, smallest, what_helps
+from tankcal.planning.changes import changes_of
+from tankcal.planning.improvements import Effect
 from tankcal.planning.wall.changes import instruments_read, wall_changes_of
 from tankcal.planning.wall.foreseen_tables import tangent_sight
 from tankcal.planning.wall.model import PlannedStrap, even_radius_m, evenness_of_limbs
@@ -38,7 +40,7 @@ from tankcal.planning.wall.nominal_readings import with_nominal_readings
 from tankcal.planning.wall.prediction import foresee_table
 from tankcal.planning.wall.reading import changed, tables_of
 from tankcal.record.wall_plan import WALL_PLAN, plain_of_wall
-from tankcal.report.planning import wall_files, workbook
+from tankcal.report.planning import figures, wall_files, workbook
 from tankcal.report.planning.wall_files import form_of_wall
 from tankcal.report.planning.wall_paper import WallPaper, wall_outlook, wall_sheets
 from tankcal.report.planning.wall_rows import field_tables_of_wall
@@ -613,3 +615,16 @@ def test_field_sheets_tell_of_the_other_face_where_it_is_read(tmp_path, faces, t
     text = " ".join(str(block.data) for block in wall_sheets(paper))
     assert ("other face" in text) == told
     assert "Hits" not in str([block.data for block in wall_outlook(paper)])
+
+
+@pytest.mark.slow(after=1)
+@pytest.mark.parametrize("language", ["en", "pt-BR", "es"])
+def test_names_of_bars_are_on_the_picture(language):
+    """Also that of a change with a long name: matplotlib says how wide it is drawn."""
+    prediction = predict(load_plan(TANGENTS))
+    wanted = changes_of(prediction.plan, items=("station", "traverse"))
+    effects = tuple(Effect(one, 0.001, 1e-6 * k, 1.0, 0) for k, one in enumerate(wanted))
+    figure = figures.changes(WallPaper(prediction, language, effects))
+    figure.canvas.draw()
+    edges = [one.get_window_extent().x0 for one in figure.axes[0].get_yticklabels()]
+    assert min(edges) >= 0

@@ -16,6 +16,7 @@ from tankcal.pipeline.plots import (
 from tankcal.report.planning.sketches import unrolled
 
 MOST = 32  # bars
+LABELS, ROOM = 2.4, 0.12  # inches that the names of bars have at least; beside the longest
 COLOURS = {"add": INK, "repeat": PALE, "drop": RED}
 
 
@@ -123,5 +124,7 @@ def changes(paper):
     ax.set_xlabel(paper.word("axes.change_of_u"))
     ax.grid(True, axis="x")
     ax.set_axisbelow(True)
-    set_margins(figure, left=2.4, right=0.12, bottom=0.45, top=0.08)
+    wide = [one.get_window_extent().width / figure.dpi for one in ax.get_yticklabels()]
+    left = max(LABELS, max(wide, default=0.0) + ROOM)
+    set_margins(figure, left=left, right=0.12, bottom=0.45, top=0.08)
     return figure
