@@ -198,7 +198,7 @@ class Cofactors:
         first = np.repeat(starts[block] - np.cumsum(count) + count, count)
         entry = first + np.arange(len(to))
         inverse = np.repeat(self.inverse_roots[block, :, axis], count, axis=0)
-        wide = self.factor.normals.wide[entry]
+        wide = self.factor.normals.wide[self.plan.entries[entry]]
         out[self.plan.columns[entry], to] = -np.einsum("ti,ti->t", wide, inverse)
         return out
 
