@@ -125,16 +125,18 @@ def compile_functions(module, names):
     import numba
 
     known = dict(vars(module))
+    called = {one for name in names for one in known[name].__code__.co_names}
     for name in names:
         plain = known[name]
         bound = FunctionType(plain.__code__, known, name, plain.__defaults__)
         bound.__module__, bound.__qualname__ = plain.__module__, plain.__qualname__
-        known[name] = _jitted(numba, bound)
+        known[name] = _jitted(numba, bound, name in called)
     return SimpleNamespace(**{name: known[name] for name in names})
 
 
-def _jitted(numba, function):
-    compiled = numba.njit(**OPTIONS)(function)
+def _jitted(numba, function, into_others):
+    """A compiled function; into_others: its code becomes part of those that call it."""
+    compiled = numba.njit(**OPTIONS, forceinline=into_others)(function)
     try:
         compiled.enable_caching()
     except RuntimeError:  # nowhere to keep the result: compile in each run
