@@ -61,7 +61,8 @@ class Factor:
         inner = scale * columns
         if self.tangent is not None:
             inner = self.tangent.in_null_space(inner)
-        inner = scipy.linalg.cho_solve((self.lower, True), inner, check_finite=False)
+        if inner.size:
+            inner, _ = scipy.linalg.lapack.dpotrs(self.lower, inner, lower=1)
         return scale * (inner if self.tangent is None else self.tangent.from_null_space(inner))
 
 
