@@ -5,7 +5,7 @@ first asked for, with the results kept beside the source file. All functions tha
 must live in one module: numba looks only at that file's date when it decides whether what it kept
 is still true.
 
-Compiling takes 7 s, once on a machine, and loading what was kept 0.4 s in each run. The array form
+Compiling takes 9 s, once on a machine, and loading what was kept 0.4 s in each run. The array form
 needs about 12 us for an image point in an iteration (elimination included), compiled loops less
 than a tenth of that. So arrays do the work of small problems: no small job waits for a compiler,
 and fewer rows are enough where compiled loops lie beside the package, made at installation by

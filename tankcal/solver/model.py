@@ -3,7 +3,7 @@
 The unknowns are numbered so that the reduced ones come first and the eliminated blocks, three
 unknowns each, come last. No row touches two blocks. For each block the plan keeps the sorted list
 of reduced columns that occur together with it: its part of the normal matrix is stored for these
-columns only, one after the other ("wide").
+columns only, in three rows, one an unknown of the block ("wide").
 """
 
 from collections.abc import Callable
