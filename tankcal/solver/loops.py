@@ -14,6 +14,7 @@ whether one that might be negative is counted from the end.
 
 import numpy as np
 
+PANEL = 64  # columns of Y whose products with those after them are taken at once
 TOGETHER = 32  # blocks with the same columns that are eliminated at once
 COMPILED = (
     "_follow",
@@ -209,20 +210,41 @@ def _forward_all(v, b, o, wide, first, n, right):
         right[a] += y0 * b0 + y1 * b1 + y2 * b2
 
 
-def _leave(t, columns, runs, first, y, product):
-    """Take Y'Y, its upper half, from the places of its columns in t; y (3 blocks, n)."""
-    np.dot(y.T, y, product)
-    n, width = len(columns), t.shape[1]
-    flat, part = t.reshape(t.size), product.reshape(product.size)
-    for one in range(len(runs) - 1):
-        edge = runs[one] - first
-        for a in range(runs[one + 1] - runs[one]):
+def _leave(t, columns, runs, first, y, store):
+    """Take Y'Y, its upper half, from the places of its columns in t; y (3 blocks, n).
+
+    Of many columns PANEL at a time are multiplied by themselves and those after them.
+    """
+    rows, n = y.shape
+    width, one = t.shape[1], 0
+    flat = t.reshape(t.size)
+    for low in range(0, n, PANEL):
+        high = min(low + PANEL, n)
+        if n <= PANEL:
+            part = store[: n * n]
+            np.dot(y.T, y, part.reshape((n, n)))
+        else:
+            wide, tall = (high - low) * (n - low), (high - low) * rows
+            part = store[:wide]
+            left = store[wide : wide + tall].reshape((rows, high - low))
+            right = store[wide + tall : wide + tall + rows * (n - low)].reshape((rows, n - low))
+            for i in range(rows):
+                for a in range(low, high):
+                    left[i, a - low] = y[i, a]
+                for a in range(low, n):
+                    right[i, a - low] = y[i, a]
+            np.dot(left.T, right, part.reshape((high - low, n - low)))
+        for a in range(low, high):
+            if runs[one + 1] - first == a:
+                one += 1
+            line = columns[a] * width
+            of = np.uintp((a - low) * (n - low))
             for other in range(one, len(runs) - 1):
-                begin = max(edge + a, runs[other] - first)
-                to = np.uintp((columns[edge] + a) * width + columns[begin])
-                of = np.uintp((edge + a) * n + begin)
+                begin = max(a, runs[other] - first)
+                to = np.uintp(line + columns[begin])
+                at = of + np.uintp(begin - low)
                 for q in range(np.uintp(runs[other + 1] - first - begin)):
-                    flat[to + q] -= part[of + q]
+                    flat[to + q] -= part[at + q]
 
 
 def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, smallest):
@@ -233,7 +255,7 @@ def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, sm
     longest = 0
     for o in range(len(b)):
         longest = max(longest, starts[o + 1] - starts[o])
-    store, square = np.empty(longest), np.empty(longest * longest)
+    store, square = np.empty(longest), np.empty((longest + 6 * TOGETHER) * longest)
     for k in range(len(alike) - 1):
         first = starts[alike[k]]
         n = starts[alike[k] + 1] - first
@@ -248,7 +270,7 @@ def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, sm
                     return o
                 _forward(v[o], b[o])
                 _forward_all(v, b, o, wide, 3 * starts[o], n, right)
-            _leave(t, mine, edges, first, y, square[: n * n].reshape((n, n)))
+            _leave(t, mine, edges, first, y, square)
         for a in range(n):
             g[mine[a]] -= right[a]
     return -1

@@ -8,8 +8,7 @@ import pytest
 from tankcal.camera import imaging
 from tankcal.camera.model import Form
 from tankcal.geometry.rotations import rotation_of_view
-from tankcal.solver import Group, loops, model
-from tankcal.solver.elimination import block_rows
+from tankcal.solver import Group, elimination, loops, model
 from tankcal.solver.model import Normals
 
 PHOTOS, POINTS, RAYS = 3, 40, 210  # more of a photo than are computed side by side
@@ -92,13 +91,38 @@ def test_plans_by_loops_are_those_of_arrays(monkeypatch):
         assert one.place is None or (one.place == other.place).all()
 
 
+@pytest.mark.parametrize("panel", [4, loops.PANEL])
+def test_elimination_by_loops_is_that_of_arrays(panel, monkeypatch):
+    rng, reduced, blocks = np.random.default_rng(7), 15, 12
+    plan = model.plan(reduced, blocks, groups_of(rng, reduced, blocks))
+    first, second = Normals.zero(plan), Normals.zero(plan)
+    root = np.tril(rng.uniform(1, 2, (blocks, 3, 3)))
+    first.v[:] = (root @ root.transpose(0, 2, 1))[:, *np.tril_indices(3)]
+    for part in (first.wide[:-1], first.b, first.t[:-1, :-1], first.g[:-1]):
+        part[:] = rng.normal(size=part.shape)
+    for name in vars(first):
+        getattr(second, name)[:] = getattr(first, name)
+    assert elimination.eliminate(plan, first, 1e-3, 1e-12) == -1
+    step = rng.normal(size=reduced)
+    blocks_of_arrays = elimination.back_substitute(plan, first, step)
+    monkeypatch.setattr(loops, "PANEL", panel)
+    monkeypatch.setattr(elimination, "is_worth_compiling", lambda rows=0: True)
+    plain = SimpleNamespace(**{name: vars(loops)[name] for name in loops.COMPILED})
+    monkeypatch.setattr(elimination, "compile_functions", lambda module, names: plain)
+    assert elimination.eliminate(plan, second, 1e-3, 1e-12) == -1
+    for name in vars(first):
+        assert getattr(second, name) == pytest.approx(getattr(first, name), abs=1e-12), name
+    found = elimination.back_substitute(plan, second, step)
+    assert found == pytest.approx(blocks_of_arrays, abs=1e-12)
+
+
 def test_the_wide_part_has_three_rows_a_block():
     """Closed form: number 10 c + i at column c and unknown i of a block."""
     reduced, blocks = 15, 12
     plan = model.plan(reduced, blocks, groups_of(np.random.default_rng(3), reduced, blocks))
     normals = Normals.zero(plan)
     normals.wide[plan.entries[:-1]] = 10 * plan.columns[:, None] + np.arange(3)
-    dense = block_rows(plan, normals.wide).toarray().reshape(blocks, 3, reduced)
+    dense = elimination.block_rows(plan, normals.wide).toarray().reshape(blocks, 3, reduced)
     for o in range(blocks):
         columns = plan.columns[plan.starts[o] : plan.starts[o + 1]]
         expected = np.zeros((3, reduced))
