@@ -11,7 +11,7 @@ import numpy as np
 
 from tankcal.solver.compiled import compile_functions, is_worth_compiling
 
-NEWTON_STEPS = 6  # quadratic: a distortion of 30 % of the radius is solved to the last digit
+LANES = 64  # image points of a photo that are computed side by side
 
 
 def apply_first_affinity(x, y, q, form):
@@ -101,16 +101,23 @@ def undistorted_by(x, y, q, form):
     x, y : float or ndarray, shape (n,)
         The measured point, from the principal point, mm.
     """
+    # six steps, quadratic: a distortion of 30 % of the radius is solved to the last digit; one by
+    # one, for points with a loop each are not compiled to be computed side by side
+    px, py = _newton_step(x, y, x, y, q, form)
+    px, py = _newton_step(px, py, x, y, q, form)
+    px, py = _newton_step(px, py, x, y, q, form)
+    px, py = _newton_step(px, py, x, y, q, form)
+    px, py = _newton_step(px, py, x, y, q, form)
+    return _newton_step(px, py, x, y, q, form)
+
+
+def _newton_step(px, py, x, y, q, form):
     side = form[0]
-    px, py = x, y
-    for _ in range(NEWTON_STEPS):
-        dx, dy, dxx, dxy, dyx, dyy = distort(px, py, q, form)
-        a, b, c, d = 1.0 + side * dxx, side * dxy, side * dyx, 1.0 + side * dyy
-        ex, ey = px + side * dx - x, py + side * dy - y
-        determinant = a * d - b * c
-        px = px - (d * ex - b * ey) / determinant
-        py = py - (a * ey - c * ex) / determinant
-    return px, py
+    dx, dy, dxx, dxy, dyx, dyy = distort(px, py, q, form)
+    a, b, c, d = 1.0 + side * dxx, side * dxy, side * dyx, 1.0 + side * dyy
+    ex, ey = px + side * dx - x, py + side * dy - y
+    determinant = a * d - b * c
+    return px - (d * ex - b * ey) / determinant, py - (a * ey - c * ex) / determinant
 
 
 def image_point(x, y, q, form, of_ideal):
@@ -302,17 +309,46 @@ def ten(a, b, p, q):
     )
 
 
+def _keep(lane, l, x, y, dx, dy):
+    """Write what is computed of image point l, number by number: what has a place that the compiler
+    knows is computed side by side."""
+    lane[3, l], lane[4, l] = x, y
+    lane[5, l], lane[24, l] = dx[0], dy[0]
+    lane[6, l], lane[25, l] = dx[1], dy[1]
+    lane[7, l], lane[26, l] = dx[2], dy[2]
+    lane[8, l], lane[27, l] = dx[3], dy[3]
+    lane[9, l], lane[28, l] = dx[4], dy[4]
+    lane[10, l], lane[29, l] = dx[5], dy[5]
+    lane[11, l], lane[30, l] = dx[6], dy[6]
+    lane[12, l], lane[31, l] = dx[7], dy[7]
+    lane[13, l], lane[32, l] = dx[8], dy[8]
+    lane[14, l], lane[33, l] = dx[9], dy[9]
+    lane[15, l], lane[34, l] = dx[10], dy[10]
+    lane[16, l], lane[35, l] = dx[11], dy[11]
+    lane[17, l], lane[36, l] = dx[12], dy[12]
+    lane[18, l], lane[37, l] = dx[13], dy[13]
+    lane[19, l], lane[38, l] = dx[14], dy[14]
+    lane[20, l], lane[39, l] = dx[15], dy[15]
+    lane[21, l], lane[40, l] = dx[16], dy[16]
+    lane[22, l], lane[41, l] = dx[17], dy[17]
+    lane[23, l], lane[42, l] = dx[18], dy[18]
+
+
 def _loop(
     xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac,
     in_ideal,
 ):  # fmt: skip
-    """image_rows, one image point after the other; places are named one by one, for a part of an
-    array costs more than a number."""
-    for i in range(len(point)):
-        j, f = point[i], photo[i]
-        ground = (
-            xyz[j, 0] - photo_xyz[f, 0], xyz[j, 1] - photo_xyz[f, 1], xyz[j, 2] - photo_xyz[f, 2]
-        )  # fmt: skip
+    """image_rows, for up to LANES neighbouring image points of a photo at a time.
+
+    Rows of lane: X - S (3), the measured point and in its place the misclosure (2), derivatives of
+    x (19), of y (19). Places are named one by one: a part of an array costs more than a number.
+    """
+    lane = np.empty((43, LANES))
+    end, n = 0, len(point)
+    while end < n:
+        begin, f = end, photo[end]
+        while end < n and end - begin < LANES and photo[end] == f:
+            end += 1
         turn = (
             rotation[f, 0, 0], rotation[f, 0, 1], rotation[f, 0, 2],
             rotation[f, 1, 0], rotation[f, 1, 1], rotation[f, 1, 2],
@@ -323,31 +359,57 @@ def _loop(
             interior[f, 5], interior[f, 6], interior[f, 7], interior[f, 8], interior[f, 9],
             interior[f, 10], interior[f, 11], interior[f, 12],
         )  # fmt: skip
-        if in_ideal:
-            mx, my = xy[i, 0], xy[i, 1]
-            x, y, dx, dy = ideal_point_derivatives(ground, turn, own, (mx, my), form, of_ideal)
-        else:
-            x, y, dx, dy = image_point_derivatives(ground, turn, own, form, of_ideal)
-            x, y = x - xy[i, 0], y - xy[i, 1]
-        wx, wy = weight[i, 0], weight[i, 1]
-        w[i, 0] = x * wx
-        w[i, 1] = y * wy
-        if len(jac) == 0:
-            continue
-        for k in range(3):
-            gx, gy = dx[k] * wx, dy[k] * wy
-            jac[i, 0, k], jac[i, 1, k] = gx, gy
-            jac[i, 0, 3 + k], jac[i, 1, 3 + k] = -gx, -gy
-            jac[i, 0, 6 + k], jac[i, 1, 6 + k] = dx[3 + k] * wx, dy[3 + k] * wy
-        for k in range(len(active)):
-            jac[i, 0, 9 + k] = dx[6 + active[k]] * wx
-            jac[i, 1, 9 + k] = dy[6 + active[k]] * wy
+        for l in range(end - begin):
+            j = point[begin + l]
+            lane[0, l] = xyz[j, 0] - photo_xyz[f, 0]
+            lane[1, l] = xyz[j, 1] - photo_xyz[f, 1]
+            lane[2, l] = xyz[j, 2] - photo_xyz[f, 2]
+            lane[3, l], lane[4, l] = xy[begin + l, 0], xy[begin + l, 1]
+        _side_by_side(lane, end - begin, turn, own, form, of_ideal, in_ideal)
+        for l in range(end - begin):
+            i = begin + l
+            wx, wy = weight[i, 0], weight[i, 1]
+            w[i, 0], w[i, 1] = lane[3, l] * wx, lane[4, l] * wy
+            if len(jac) == 0:
+                continue
+            for k in range(3):
+                gx, gy = lane[5 + k, l] * wx, lane[24 + k, l] * wy
+                jac[i, 0, k], jac[i, 1, k] = gx, gy
+                jac[i, 0, 3 + k], jac[i, 1, 3 + k] = -gx, -gy
+                jac[i, 0, 6 + k], jac[i, 1, 6 + k] = lane[8 + k, l] * wx, lane[27 + k, l] * wy
+            for k in range(len(active)):
+                jac[i, 0, 9 + k] = lane[11 + active[k], l] * wx
+                jac[i, 1, 9 + k] = lane[30 + active[k], l] * wy
+
+
+def _side_by_side(lane, n, turn, own, form, of_ideal, in_ideal):
+    """Misclosures and derivatives of n image points of a photo, in the rows of lane."""
+    if in_ideal:
+        for l in range(n):
+            x, y, dx, dy = ideal_point_derivatives(
+                (lane[0, l], lane[1, l], lane[2, l]), turn, own, (lane[3, l], lane[4, l]),
+                form, of_ideal,
+            )  # fmt: skip
+            _keep(lane, l, x, y, dx, dy)
+    elif of_ideal:
+        for l in range(n):
+            x, y, dx, dy = image_point_derivatives(
+                (lane[0, l], lane[1, l], lane[2, l]), turn, own, form, True
+            )
+            _keep(lane, l, x - lane[3, l], y - lane[4, l], dx, dy)
+    else:
+        for l in range(n):
+            x, y, dx, dy = image_point_derivatives(
+                (lane[0, l], lane[1, l], lane[2, l]), turn, own, form, False
+            )
+            _keep(lane, l, x - lane[3, l], y - lane[4, l], dx, dy)
 
 
 _COMPILED = (
     "apply_first_affinity",
     "distort",
     "distortion_derivatives",
+    "_newton_step",
     "undistorted_by",
     "image_point",
     "ideal_point",
@@ -355,6 +417,8 @@ _COMPILED = (
     "ten",
     "image_point_derivatives",
     "ideal_point_derivatives",
+    "_keep",
+    "_side_by_side",
     "_loop",
 )
 

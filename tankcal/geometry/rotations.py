@@ -9,6 +9,10 @@ Photogrammetric Computer Vision, ch. 8.
 
 import numpy as np
 
+_CROSS = np.zeros((3, 3, 3))  # [d]x by d
+_CROSS[[0, 1, 2], [2, 0, 1], [1, 2, 0]] = 1.0
+_CROSS[[0, 1, 2], [1, 2, 0], [2, 0, 1]] = -1.0
+
 
 def rotation_of_angles(omega_rad, phi_rad, kappa_rad):
     """Rotation matrices R3(kappa) R2(phi) R1(omega) of angles.
@@ -129,9 +133,7 @@ def apply_small_rotation(rotation, small_rad):
     ndarray, shape (n, 3, 3)
     """
     d = np.asarray(small_rad, dtype=float)
-    cross = np.zeros((len(d), 3, 3))
-    cross[:, [2, 0, 1], [1, 2, 0]] = d
-    cross[:, [1, 2, 0], [2, 0, 1]] = -d
+    cross = (d @ _CROSS.reshape(3, 9)).reshape(-1, 3, 3)
     half = 0.5 * np.sqrt(np.einsum("ni,ni->n", d, d))
     half = np.maximum(half, 1e-30)[:, None, None]
     first, second = np.sin(2 * half) / (2 * half), 0.5 * (np.sin(half) / half) ** 2

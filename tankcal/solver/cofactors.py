@@ -61,7 +61,8 @@ class Factor:
         inner = scale * columns
         if self.tangent is not None:
             inner = self.tangent.in_null_space(inner)
-        inner = scipy.linalg.cho_solve((self.lower, True), inner, check_finite=False)
+        if inner.size:
+            inner, _ = scipy.linalg.lapack.dpotrs(self.lower, inner, lower=1)
         return scale * (inner if self.tangent is None else self.tangent.from_null_space(inner))
 
 
@@ -198,7 +199,7 @@ class Cofactors:
         first = np.repeat(starts[block] - np.cumsum(count) + count, count)
         entry = first + np.arange(len(to))
         inverse = np.repeat(self.inverse_roots[block, :, axis], count, axis=0)
-        wide = self.factor.normals.wide[entry]
+        wide = self.factor.normals.wide[self.plan.entries[entry]]
         out[self.plan.columns[entry], to] = -np.einsum("ti,ti->t", wide, inverse)
         return out
 

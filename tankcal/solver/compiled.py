@@ -5,7 +5,7 @@ first asked for, with the results kept beside the source file. All functions tha
 must live in one module: numba looks only at that file's date when it decides whether what it kept
 is still true.
 
-Compiling takes 7 s, once on a machine, and loading what was kept 0.4 s in each run. The array form
+Compiling takes 9 s, once on a machine, and loading what was kept 0.4 s in each run. The array form
 needs about 12 us for an image point in an iteration (elimination included), compiled loops less
 than a tenth of that. So arrays do the work of small problems: no small job waits for a compiler,
 and fewer rows are enough where compiled loops lie beside the package, made at installation by
@@ -125,16 +125,18 @@ def compile_functions(module, names):
     import numba
 
     known = dict(vars(module))
+    called = {one for name in names for one in known[name].__code__.co_names}
     for name in names:
         plain = known[name]
         bound = FunctionType(plain.__code__, known, name, plain.__defaults__)
         bound.__module__, bound.__qualname__ = plain.__module__, plain.__qualname__
-        known[name] = _jitted(numba, bound)
+        known[name] = _jitted(numba, bound, name in called)
     return SimpleNamespace(**{name: known[name] for name in names})
 
 
-def _jitted(numba, function):
-    compiled = numba.njit(**OPTIONS)(function)
+def _jitted(numba, function, into_others):
+    """A compiled function; into_others: its code becomes part of those that call it."""
+    compiled = numba.njit(**OPTIONS, forceinline=into_others)(function)
     try:
         compiled.enable_caching()
     except RuntimeError:  # nowhere to keep the result: compile in each run

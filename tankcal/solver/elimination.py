@@ -10,16 +10,17 @@ from tankcal.solver import loops
 from tankcal.solver.compiled import compile_functions, is_worth_compiling
 
 
-def add_rows(batch, w, jac, normals):
-    """Add rows of a Batch, w (n, m) and jac (n, m, K), to the Normals."""
+def add_rows(plan, batch, w, jac, normals):
+    """Add rows of a Batch of a Plan, w (n, m) and jac (n, m, K), to the Normals."""
     if is_worth_compiling():
         run = compile_functions(loops, loops.COMPILED)
         skip = 0 if batch.block is None else 3
         run._add_squares(w, jac, skip, batch.first, batch.cuts, normals.t, normals.g)
         if batch.block is not None:
             run._add_blocks(
-                w, jac, batch.block, batch.place, batch.cuts, normals.v, normals.wide, normals.b
-            )
+                w, jac, batch.block, batch.place, batch.cuts, plan.starts,
+                normals.v, normals.wide, normals.b,
+            )  # fmt: skip
         return
     f, columns = jac, batch.columns
     if batch.block is not None:
@@ -27,7 +28,7 @@ def add_rows(batch, w, jac, normals):
         square = np.einsum("nma,nmb->nab", e, e)
         np.add.at(normals.v, batch.block, square[:, *np.tril_indices(3)])
         np.add.at(normals.b, batch.block, np.einsum("nma,nm->na", e, w))
-        np.add.at(normals.wide, batch.places, np.einsum("nmk,nma->nka", f, e))
+        np.add.at(normals.wide, plan.entries[batch.places], np.einsum("nmk,nma->nka", f, e))
     np.add.at(normals.g, columns, np.einsum("nmk,nm->nk", f, w))
     once = np.triu(np.ones((f.shape[2],) * 2)) * np.einsum("nma,nmb->nab", f, f)
     np.add.at(normals.t, (columns[:, :, None], columns[:, None, :]), once)
@@ -55,7 +56,8 @@ def eliminate(plan, normals, damping, smallest):
     normals.v[:] = root[:, *np.tril_indices(3)]
     normals.b[:] = np.linalg.solve(root, normals.b[:, :, None])[:, :, 0]
     owner = np.repeat(np.arange(plan.blocks), np.diff(plan.starts))
-    normals.wide[:-1] = np.linalg.solve(root[owner], normals.wide[:-1, :, None])[:, :, 0]
+    entries = plan.entries[:-1]
+    normals.wide[entries] = np.linalg.solve(root[owner], normals.wide[entries, None])[:, :, 0]
     y = block_rows(plan, normals.wide)
     normals.t[:-1, :-1] -= np.triu((y.T @ y).toarray())
     normals.g[:-1] -= y.T @ normals.b.ravel()
@@ -64,11 +66,11 @@ def eliminate(plan, normals, damping, smallest):
 
 def block_rows(plan, wide):
     """The wide part as a sparse matrix (3 nb, nr)."""
-    owner = np.repeat(np.arange(plan.blocks), np.diff(plan.starts))
-    rows = 3 * owner[:, None] + np.arange(3)
-    columns = np.repeat(plan.columns[:, None], 3, axis=1)
+    ends = np.cumsum(np.repeat(np.diff(plan.starts), 3))
+    columns = np.empty(3 * len(plan.columns), dtype=plan.columns.dtype)
+    columns[plan.entries[:-1]] = plan.columns[:, None]
     return scipy.sparse.csr_array(
-        (wide[:-1].ravel(), (rows.ravel(), columns.ravel())), shape=(3 * plan.blocks, plan.reduced)
+        (wide[:-1], columns, np.append(0, ends)), shape=(3 * plan.blocks, plan.reduced)
     )
 
 
@@ -77,7 +79,7 @@ def back_substitute(plan, normals, reduced):
     if is_worth_compiling(plan.rows):
         out = np.empty((plan.blocks, 3))
         compile_functions(loops, loops.COMPILED)._back(
-            normals.v, normals.wide, normals.b, plan.starts, plan.columns, reduced, out
+            normals.v, normals.wide, normals.b, plan.starts, plan.columns, plan.alike, reduced, out
         )
         return out
     right = normals.b + (block_rows(plan, normals.wide) @ reduced).reshape(-1, 3)
@@ -107,7 +109,7 @@ def block_cofactors(plan, normals, inverse):
     root = np.linalg.inv(roots(normals))
     for o in range(plan.blocks):
         here = slice(plan.starts[o], plan.starts[o + 1])
-        z = normals.wide[here] @ root[o]
+        z = normals.wide[plan.entries[here]] @ root[o]
         columns = plan.columns[here]
         cross[here] = -inverse[np.ix_(columns, columns)] @ z
         out[o] = root[o].T @ root[o] - z.T @ cross[here]

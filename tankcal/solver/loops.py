@@ -14,8 +14,13 @@ whether one that might be negative is counted from the end.
 
 import numpy as np
 
+PANEL = 64  # columns of Y whose products with those after them are taken at once
 TOGETHER = 32  # blocks with the same columns that are eliminated at once
 COMPILED = (
+    "_follow",
+    "_mark",
+    "_list_columns",
+    "_find_places",
     "_is_alike",
     "_add_squares",
     "_add_blocks",
@@ -28,6 +33,76 @@ COMPILED = (
     "_cofactors",
     "_leverage",
 )
+
+
+def _mark(block, first, cuts, together):
+    """Mark (blocks, columns) where rows with a block have columns: first (n, s) of runs."""
+    for i in range(len(block)):
+        for run in range(len(cuts) - 1):
+            for step in range(cuts[run + 1] - cuts[run]):
+                together[block[i], first[i, run] + step] = True
+
+
+def _follow(columns, spare, follows):
+    """follows (k - 1,) stays True where in all rows (n, k) a column is the one after its left."""
+    for i in range(len(columns)):
+        for a in range(len(follows)):
+            right = columns[i, a + 1]
+            follows[a] &= (right == columns[i, a] + 1) & (right != spare)
+
+
+def _list_columns(together, reduced, starts):
+    """columns, ends and alike of a Plan, by the marks (blocks, columns); starts is filled."""
+    blocks = len(together)
+    for o in range(blocks):
+        count = 0
+        for c in range(reduced):
+            count += together[o, c]
+        starts[o + 1] = starts[o] + count
+    columns = np.empty(starts[blocks], dtype=np.int32)
+    ends, alike = np.empty(starts[blocks] + 1, dtype=np.int64), np.empty(blocks + 1, dtype=np.int64)
+    runs, series, before = 0, 0, 0
+    for o in range(blocks):
+        differing, first = 0, starts[o]
+        if o > 0:
+            for c in range(reduced):
+                differing += together[o, c] != together[o - 1, c]
+        if o > 0 and differing == 0:  # as the one before
+            length = starts[o + 1] - first
+            for a in range(first, first + length):
+                columns[a] = columns[a - length]
+            count = runs - before
+            for run in range(runs, runs + count):
+                ends[run] = ends[run - count] + length
+            before, runs = runs, runs + count
+            continue
+        alike[series] = o
+        series += 1
+        at, last, before = first, -2, runs
+        for c in range(reduced):
+            if together[o, c]:
+                if c != last + 1:
+                    ends[runs] = at
+                    runs += 1
+                columns[at] = c
+                at, last = at + 1, c
+    ends[runs], alike[series] = starts[blocks], blocks
+    return columns, ends[: runs + 1].copy(), alike[: series + 1].copy()
+
+
+def _find_places(block, first, reduced, starts, columns, place):
+    """Where the first column of each run and the block meet in the wide part; see Batch.place."""
+    for i in range(len(block)):
+        for run in range(first.shape[1]):
+            c = first[i, run]
+            low, high = starts[block[i]], starts[block[i] + 1]
+            while low < high:  # the first that is not below it
+                middle = (low + high) // 2
+                if columns[middle] < c:
+                    low = middle + 1
+                else:
+                    high = middle
+            place[i, run] = starts[-1] if c == reduced else low
 
 
 def _add_squares(w, jac, skip, first, cuts, t, g):
@@ -64,11 +139,13 @@ def _is_alike(first, i, j):
     return alike
 
 
-def _add_blocks(w, jac, block, place, cuts, v, wide, b):
+def _add_blocks(w, jac, block, place, cuts, starts, v, wide, b):
     """V += E'E, wide += F'E, b += E'w; E are the first three derivatives, F those after them."""
     n, m, _ = jac.shape
+    spare = starts[-1]
     for i in range(n):
         o = block[i]
+        before, length = 2 * starts[o], np.uintp(starts[o + 1] - starts[o])
         for row in range(0, m, 2):  # two at a time: image coordinates, most of the work
             x = min(row + 1, m - 1)
             both = 1.0 if x > row else 0.0
@@ -84,12 +161,15 @@ def _add_blocks(w, jac, block, place, cuts, v, wide, b):
             v[o, 4] += e2 * e1 + d2 * d1
             v[o, 5] += e2 * e2 + d2 * d2
             for one in range(len(cuts) - 1):
-                to = place[i, one] - cuts[one]
+                if place[i, one] == spare:
+                    continue
+                to = np.uintp(before + place[i, one])
                 for a in range(cuts[one], cuts[one + 1]):
                     f, h = jac[i, row, 3 + a], jac[i, x, 3 + a]
-                    wide[to + a, 0] += f * e0 + h * d0
-                    wide[to + a, 1] += f * e1 + h * d1
-                    wide[to + a, 2] += f * e2 + h * d2
+                    wide[to] += f * e0 + h * d0
+                    wide[to + length] += f * e1 + h * d1
+                    wide[to + length + length] += f * e2 + h * d2
+                    to += np.uintp(1)
 
 
 def _root(v, damping, smallest):
@@ -115,34 +195,56 @@ def _forward(v, b):
     b[2] = (b[2] - v[3] * b[0] - v[4] * b[1]) / v[5]
 
 
-def _forward_all(v, part, b, y, g, columns):
-    """The wide part of a block becomes Y, also in three rows of y; g loses Y b."""
-    l10, l20, l21 = v[1], v[3], v[4]
-    i0, i1, i2 = 1.0 / v[0], 1.0 / v[2], 1.0 / v[5]
-    b0, b1, b2 = b[0], b[1], b[2]
-    for a in range(len(columns)):
-        w0 = part[a, 0] * i0
-        w1 = (part[a, 1] - l10 * w0) * i1
-        w2 = (part[a, 2] - l20 * w0 - l21 * w1) * i2
-        part[a, 0], part[a, 1], part[a, 2] = w0, w1, w2
-        y[0, a], y[1, a], y[2, a] = w0, w1, w2
-        g[columns[a]] -= w0 * b0 + w1 * b1 + w2 * b2
+def _forward_all(v, b, o, wide, first, n, right):
+    """The wide part of block o, 3 n numbers from `first` on, becomes Y; right (n,) gains Y b."""
+    l10, l20, l21 = v[o, 1], v[o, 3], v[o, 4]
+    i0, i1, i2 = 1.0 / v[o, 0], 1.0 / v[o, 2], 1.0 / v[o, 5]
+    b0, b1, b2 = b[o, 0], b[o, 1], b[o, 2]
+    one = np.uintp(first)
+    two, three = one + np.uintp(n), one + np.uintp(2 * n)
+    for a in range(np.uintp(n)):
+        y0 = wide[one + a] * i0
+        y1 = (wide[two + a] - l10 * y0) * i1
+        y2 = (wide[three + a] - l20 * y0 - l21 * y1) * i2
+        wide[one + a], wide[two + a], wide[three + a] = y0, y1, y2
+        right[a] += y0 * b0 + y1 * b1 + y2 * b2
 
 
-def _leave(t, columns, runs, first, y, product):
-    """Take Y'Y, its upper half, from the places of its columns in t; y (3 blocks, n)."""
-    np.dot(y.T, y, product)
-    n, width = len(columns), t.shape[1]
-    flat, part = t.reshape(t.size), product.reshape(product.size)
-    for one in range(len(runs) - 1):
-        edge = runs[one] - first
-        for a in range(runs[one + 1] - runs[one]):
+def _leave(t, columns, runs, first, y, store):
+    """Take Y'Y, its upper half, from the places of its columns in t; y (3 blocks, n).
+
+    Of many columns PANEL at a time are multiplied by themselves and those after them.
+    """
+    rows, n = y.shape
+    width, one = t.shape[1], 0
+    flat = t.reshape(t.size)
+    for low in range(0, n, PANEL):
+        high = min(low + PANEL, n)
+        if n <= PANEL:
+            part = store[: n * n]
+            np.dot(y.T, y, part.reshape((n, n)))
+        else:
+            wide, tall = (high - low) * (n - low), (high - low) * rows
+            part = store[:wide]
+            left = store[wide : wide + tall].reshape((rows, high - low))
+            right = store[wide + tall : wide + tall + rows * (n - low)].reshape((rows, n - low))
+            for i in range(rows):
+                for a in range(low, high):
+                    left[i, a - low] = y[i, a]
+                for a in range(low, n):
+                    right[i, a - low] = y[i, a]
+            np.dot(left.T, right, part.reshape((high - low, n - low)))
+        for a in range(low, high):
+            if runs[one + 1] - first == a:
+                one += 1
+            line = columns[a] * width
+            of = np.uintp((a - low) * (n - low))
             for other in range(one, len(runs) - 1):
-                begin = max(edge + a, runs[other] - first)
-                to = np.uintp((columns[edge] + a) * width + columns[begin])
-                of = np.uintp((edge + a) * n + begin)
+                begin = max(a, runs[other] - first)
+                to = np.uintp(line + columns[begin])
+                at = of + np.uintp(begin - low)
                 for q in range(np.uintp(runs[other + 1] - first - begin)):
-                    flat[to + q] -= part[of + q]
+                    flat[to + q] -= part[at + q]
 
 
 def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, smallest):
@@ -153,40 +255,50 @@ def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, sm
     longest = 0
     for o in range(len(b)):
         longest = max(longest, starts[o + 1] - starts[o])
-    store, square = np.empty(3 * TOGETHER * longest), np.empty(longest * longest)
+    store, square = np.empty(longest), np.empty((longest + 6 * TOGETHER) * longest)
     for k in range(len(alike) - 1):
         first = starts[alike[k]]
         n = starts[alike[k] + 1] - first
-        mine = columns[first : first + n]
+        mine, right = columns[first : first + n], store[:n]
         edges = ends[runs[alike[k]] : runs[alike[k] + 1] + 1]
+        right[:] = 0.0
         for begin in range(alike[k], alike[k + 1], TOGETHER):
-            count = min(TOGETHER, alike[k + 1] - begin)
-            y = store[: 3 * count * n].reshape((3 * count, n))
-            for o in range(begin, begin + count):
+            end = min(begin + TOGETHER, alike[k + 1])
+            y = wide[3 * starts[begin] : 3 * starts[end]].reshape((3 * (end - begin), n))
+            for o in range(begin, end):
                 if not _root(v[o], damping, smallest):
                     return o
                 _forward(v[o], b[o])
-                row = 3 * (o - begin)
-                part = wide[starts[o] : starts[o] + n]
-                _forward_all(v[o], part, b[o], y[row : row + 3], g, mine)
-            _leave(t, mine, edges, first, y, square[: n * n].reshape((n, n)))
+                _forward_all(v, b, o, wide, 3 * starts[o], n, right)
+            _leave(t, mine, edges, first, y, square)
+        for a in range(n):
+            g[mine[a]] -= right[a]
     return -1
 
 
-def _back(v, wide, b, starts, columns, reduced, out):
-    flat, one, two, three = wide.reshape(wide.size), np.uintp(1), np.uintp(2), np.uintp(3)
+def _back(v, wide, b, starts, columns, alike, reduced, out):
+    """L^-T (b + Y' reduced) of each block into out (nb, 3)."""
+    longest = 0
     for o in range(len(b)):
-        x0, x1, x2 = b[o, 0], b[o, 1], b[o, 2]
-        first = np.uintp(starts[o])
-        for a in range(np.uintp(starts[o + 1] - starts[o])):
-            r, at = reduced[np.uintp(columns[first + a])], three * (first + a)
-            x0 += flat[at] * r
-            x1 += flat[at + one] * r
-            x2 += flat[at + two] * r
-        x2 = x2 / v[o, 5]
-        x1 = (x1 - v[o, 4] * x2) / v[o, 2]
-        x0 = (x0 - v[o, 1] * x1 - v[o, 3] * x2) / v[o, 0]
-        out[o, 0], out[o, 1], out[o, 2] = x0, x1, x2
+        longest = max(longest, starts[o + 1] - starts[o])
+    store = np.empty(longest)
+    for k in range(len(alike) - 1):
+        first = starts[alike[k]]
+        n = starts[alike[k] + 1] - first
+        own = store[:n]
+        for a in range(n):
+            own[a] = reduced[columns[first + a]]
+        for o in range(alike[k], alike[k + 1]):
+            at, length = np.uintp(3 * starts[o]), np.uintp(n)
+            x0, x1, x2 = b[o, 0], b[o, 1], b[o, 2]
+            for a in range(length):
+                x0 += wide[at + a] * own[a]
+                x1 += wide[at + length + a] * own[a]
+                x2 += wide[at + length + length + a] * own[a]
+            x2 = x2 / v[o, 5]
+            x1 = (x1 - v[o, 4] * x2) / v[o, 2]
+            x0 = (x0 - v[o, 1] * x1 - v[o, 3] * x2) / v[o, 0]
+            out[o, 0], out[o, 1], out[o, 2] = x0, x1, x2
 
 
 def _cofactors(v, wide, starts, columns, runs, ends, inverse, cross, out):
@@ -202,7 +314,8 @@ def _cofactors(v, wide, starts, columns, runs, ends, inverse, cross, out):
         i21 = -v[o, 4] * i11 * i22
         i20 = -(v[o, 3] * i00 + v[o, 4] * i10) * i22
         for a in range(n):
-            y0, y1, y2 = wide[first + a, 0], wide[first + a, 1], wide[first + a, 2]
+            at = 3 * first + a
+            y0, y1, y2 = wide[at], wide[at + n], wide[at + 2 * n]
             z[0, a] = i00 * y0 + i10 * y1 + i20 * y2
             z[1, a] = i11 * y1 + i21 * y2
             z[2, a] = i22 * y2

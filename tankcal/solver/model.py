@@ -3,13 +3,17 @@
 The unknowns are numbered so that the reduced ones come first and the eliminated blocks, three
 unknowns each, come last. No row touches two blocks. For each block the plan keeps the sorted list
 of reduced columns that occur together with it: its part of the normal matrix is stored for these
-columns only, one after the other ("wide").
+columns only, in three rows, one an unknown of the block ("wide").
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+
+from tankcal.solver import loops
+from tankcal.solver.compiled import compile_functions, is_worth_compiling
 
 
 @dataclass(frozen=True)
@@ -99,7 +103,8 @@ def s_transform(change, null_space, datum_basis):
 class Normals:
     """Normal equations while they are built and eliminated (see tankcal.solver.loops).
 
-    v (nb, 6), b (nb, 3), wide (t + 1, 3), t (nr + 1, nr + 1), g (nr + 1,)
+    v (nb, 6), b (nb, 3), wide (3 t + 1,), t (nr + 1, nr + 1), g (nr + 1,)
+    wide of each block is three rows, one a unknown of it; see Plan.entries
     """
 
     v: np.ndarray
@@ -114,7 +119,7 @@ class Normals:
         return cls(
             np.zeros((plan.blocks, 6)),
             np.zeros((plan.blocks, 3)),
-            np.zeros((len(plan.columns) + 1, 3)),
+            np.zeros(3 * len(plan.columns) + 1),
             np.zeros((plan.reduced + 1, plan.reduced + 1)),
             np.zeros(plan.reduced + 1),
         )
@@ -195,6 +200,14 @@ class Plan:
     alike: np.ndarray
     rows: int
 
+    @cached_property
+    def entries(self):
+        """(t + 1, 3) where in the wide part each of `columns` meets its block; a spare place."""
+        length = np.diff(self.starts)
+        first = 2 * np.repeat(self.starts[:-1], length) + np.arange(len(self.columns))
+        found = first[:, None] + np.repeat(length, length)[:, None] * np.arange(3)
+        return np.append(found, np.full((1, 3), 3 * len(self.columns)), axis=0)
+
 
 def plan(reduced, blocks, groups):
     """The Plan of groups of observations (see tankcal.solver.Group)."""
@@ -204,6 +217,16 @@ def plan(reduced, blocks, groups):
             cuts = _cuts(columns, reduced)
             first = np.ascontiguousarray(columns[:, cuts[:-1]], dtype=np.int32)
             raw.append((g, rows, order, block, cuts, first))
+    rows = max((len(group.columns) for group in groups), default=0)
+    structure = _structure_by_loops if is_worth_compiling(rows) else _structure
+    starts, columns, ends, alike, places = structure(reduced, blocks, raw)
+    batches = tuple(Batch(*fields, place) for fields, place in zip(raw, places, strict=True))
+    runs = np.searchsorted(ends, starts)
+    return Plan(reduced, blocks, batches, starts, columns, ends, runs, alike, rows)
+
+
+def _structure(reduced, blocks, raw):
+    """starts, columns, ends, alike of a Plan, and the places of each Batch."""
     together = np.zeros((blocks, reduced + 1), dtype=bool)
     for _, _, _, block, cuts, first in raw:
         if block is not None:
@@ -215,16 +238,11 @@ def plan(reduced, blocks, groups):
     columns = (met - owner * np.int64(reduced + 1)).astype(np.int32)
     place = np.full((blocks, reduced + 1), len(met), dtype=np.int32)
     place.ravel()[met] = np.arange(len(met), dtype=np.int32)
-    batches = tuple(
-        Batch(*fields, None if fields[3] is None else place[fields[3][:, None], fields[-1]])
-        for fields in raw
-    )
+    places = [None if one[3] is None else place[one[3][:, None], one[-1]] for one in raw]
     ends = np.flatnonzero(np.diff(met, prepend=-2, append=-2) != 1)
     changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
     alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
-    runs = np.searchsorted(ends, starts)
-    rows = max((len(group.columns) for group in groups), default=0)
-    return Plan(reduced, blocks, batches, starts, columns, ends, runs, alike, rows)
+    return starts, columns, ends, alike, places
 
 
 def _mark(together, block, cuts, first):
@@ -240,6 +258,24 @@ def _mark(together, block, cuts, first):
         together |= mine
 
 
+def _structure_by_loops(reduced, blocks, raw):
+    """The same by compiled loops."""
+    run = compile_functions(loops, loops.COMPILED)
+    together = np.zeros((blocks, reduced + 1), dtype=bool)
+    for _, _, _, block, cuts, first in raw:
+        if block is not None:
+            run._mark(block, first, cuts, together)
+    starts = np.zeros(blocks + 1, dtype=int)
+    columns, ends, alike = run._list_columns(together, reduced, starts)
+    places = []
+    for _, _, _, block, _, first in raw:
+        place = None if block is None else np.empty(first.shape, dtype=np.int32)
+        if block is not None:
+            run._find_places(block, first, reduced, starts, columns, place)
+        places.append(place)
+    return starts, columns, ends, alike, places
+
+
 AT_ONCE = 50_000  # rows whose columns are compared at a time
 
 
@@ -249,9 +285,13 @@ def _cuts(columns, spare):
     if k == 0 or n == 0:
         return np.arange(k + 1)
     follows = np.ones(k - 1, dtype=bool)
-    for start in range(0, n, AT_ONCE):
-        part = columns[start : start + AT_ONCE]
-        follows &= ((np.diff(part, axis=1) == 1) & (part[:, 1:] != spare)).all(axis=0)
+    if is_worth_compiling(n):
+        run = compile_functions(loops, loops.COMPILED)
+        run._follow(np.ascontiguousarray(columns), spare, follows)
+    else:
+        for start in range(0, n, AT_ONCE):
+            part = columns[start : start + AT_ONCE]
+            follows &= ((np.diff(part, axis=1) == 1) & (part[:, 1:] != spare)).all(axis=0)
     return np.append(np.flatnonzero(np.append(True, ~follows)), k)
 
 

@@ -80,7 +80,7 @@ class Rows:
             if most < np.inf and not cost <= most:
                 return np.inf
             for batch in part.batches:
-                add_rows(batch, batch.of(part.w), batch.of(part.jac), self.normals)
+                add_rows(self.plan, batch, batch.of(part.w), batch.of(part.jac), self.normals)
             if self.weighing != self.count:
                 weighing += int(np.count_nonzero(part.jac.any(axis=2)))
         if self.weighing != self.count:  # a row may have none at the start alone

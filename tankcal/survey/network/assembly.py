@@ -157,7 +157,7 @@ def _refuse_coincident(survey, groups, state):
 
 def _groups(observations, layout):
     return tuple(
-        Group(one.columns(layout).astype(np.int32), one.rows, one.fill, one.part)
+        Group(one.columns(layout).astype(np.int32, copy=False), one.rows, one.fill, one.part)
         for one in observations
     )
 
@@ -318,20 +318,23 @@ def _image_groups(survey, used, layout, reduced, table):
                 "an image coordinate cannot hold exactly: its sd must be above zero",
             )
         )
-    key, last = layout.points[images.point, 0], np.iinfo(np.int64).max
-    key = np.where(key < reduced, last, key)
+    first = layout.points[images.point, 0]
+    last = np.count_nonzero(layout.points[:, 0] >= reduced)
+    key = np.where(first < reduced, last, (first - reduced) // 3)
+    key = key.astype(np.min_scalar_type(last))  # sorted faster
     for form, order in survey.by_form(images):
         left = table[[survey.cameras[camera].form == form for camera in survey.photos.camera]]
         if not used.all():
             order = order[used[images.point[order]]]
-        if (np.diff(key[order]) < 0).any():
-            order = order[np.argsort(key[order], kind="stable")]
+        of_order = key[order]
+        if (of_order[1:] < of_order[:-1]).any():
+            order = order[np.argsort(of_order, kind="stable")]
         eliminated = np.count_nonzero(key[order] < last)
         part = np.minimum(np.arange(len(order)), eliminated) // PART
         part[eliminated:] += 1
         of_photo = part * len(survey.photos.names) + images.photo[order]
-        small = np.min_scalar_type(of_photo.max(initial=0))  # sorted faster
-        order = order[np.argsort(of_photo.astype(small), kind="stable")]
+        of_photo = of_photo.astype(np.min_scalar_type(of_photo.max(initial=0)))
+        order = order[np.argsort(of_photo, kind="stable")]
         active = np.flatnonzero((left < layout.interior.size - 1).any(axis=0))
         active = active[(layout.interior[left[:, active]] >= 0).any(axis=0)]
         one = replace(images.taken(order), form=form, active=active, interior_of=table)

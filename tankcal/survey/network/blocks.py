@@ -56,7 +56,7 @@ def correlated_groups(survey, used, centre, state):
 
     None for the Correlated of a block that is set aside as a whole: only its residuals matter.
     """
-    all_of = _every_unknown(state)
+    all_of = _every_unknown(state) if survey.correlated else None
     for block in survey.correlated:
         keep = np.ones(len(block.row), dtype=bool)
         share = np.ones(len(block.row))

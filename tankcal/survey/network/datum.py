@@ -24,10 +24,16 @@ AS_IF_FIXED = 1e4  # weight of a fixed unknown among the rows, as if it were kno
 
 def directions(layout, state):
     """The seven directions (unknowns, 7) at a state; fixed unknowns are left out."""
+    return _together(layout, _parts(layout, state))[:-1]
+
+
+def _together(layout, parts):
+    """The seven directions of parts, and a row of zeros for what is left out: (unknowns + 1, 7)."""
     whole = np.zeros((layout.unknowns + 1, 7))
-    for columns, derivative in _parts(layout, state):
+    for columns, derivative in parts:
         whole[columns.ravel()] = derivative.reshape(-1, 7)
-    return whole[:-1]
+    whole[-1] = 0.0
+    return whole
 
 
 def _parts(layout, state):
@@ -77,7 +83,8 @@ def null_space(problem, unfelt=UNFELT, fixed=True, state=None, count=None):
     """
     layout, state = problem.layout, problem.state if state is None else state
     idle = _idle(problem)
-    whole = np.vstack([directions(layout, state), np.zeros(7)])
+    parts = [*_parts(layout, state)]
+    whole = _together(layout, parts)
     felt, lengths = [np.zeros((1, 7))], np.zeros(len(whole))
     for one, weight in _feeling(problem):
         columns = one.columns(layout)
@@ -88,12 +95,12 @@ def null_space(problem, unfelt=UNFELT, fixed=True, state=None, count=None):
         jac *= weight
         ways = whole
         if undisturbed is not state:
-            ways = np.vstack([directions(layout, undisturbed), np.zeros(7)])
+            ways = _together(layout, _parts(layout, undisturbed))
         moved = np.einsum("nmk,nkd->nmd", jac, ways[columns]).reshape(-1, 7)
         felt.append(np.linalg.qr(moved, mode="r"))
         np.add.at(lengths, columns, np.einsum("nmk,nmk->nk", jac, jac))
-    square = (whole[:-1] ** 2).T @ lengths[:-1]
-    for columns, derivative in _parts(layout, state):
+    square = np.einsum("ud,ud,u->d", whole, whole, lengths)
+    for columns, derivative in parts:
         holds = (columns < 0) & np.logical_not(idle.get(id(columns), False))
         sharp = AS_IF_FIXED * derivative[holds].reshape(-1, 7)
         if fixed and sharp.any():

@@ -204,6 +204,8 @@ class Survey:
         forms = {}
         for number, camera in enumerate(self.cameras):
             forms.setdefault(camera.form, []).append(number)
+        if len(forms) == 1:
+            return [(form, np.arange(len(images))) for form in forms]
         camera = self.photos.camera[images.photo]
         return [(form, np.flatnonzero(np.isin(camera, mine))) for form, mine in forms.items()]
 

@@ -63,8 +63,11 @@ class ImageCoordinates(Observations):
     def columns(self, layout):
         """Point (3), photo (6), interior parameters (k)."""
         interior = layout.interior[self.interior_of[:, self.active]]
-        of_photo = np.hstack([layout.photos, interior])
-        return np.hstack([layout.points[self.point], of_photo[self.photo]])
+        of_photo = np.hstack([layout.photos, interior]).astype(np.int32)
+        found = np.empty((len(self), 3 + of_photo.shape[1]), dtype=np.int32)
+        found[:, :3] = layout.points[self.point]
+        found[:, 3:] = of_photo[self.photo]
+        return found
 
     def computed(self, state, derivatives):
         """Image coordinates (n, 2) in mm and their derivatives."""

@@ -92,8 +92,11 @@ class Distances(Sights):
         computed = (m * s + offset)[:, None]
         if not derivatives:
             return computed, None
-        of_tools = np.stack([s, np.ones_like(s)], axis=1)[:, None, :]
-        return computed, np.concatenate([self.of_ends(m * d / s), of_tools], axis=2)
+        found = np.ones((len(self), 1, 8))
+        found[:, 0, :3] = (m * d / s).T
+        found[:, 0, 3:6] = -found[:, 0, :3]
+        found[:, 0, 6] = s
+        return computed, found
 
 
 @dataclass(frozen=True)
