@@ -9,7 +9,8 @@ from tankcal.gum.distributions import Normal, Rectangular, StudentT, Triangular,
 from tankcal.gum.monte_carlo import Goal, QuadraticRows, numerical_tolerance, simulate, verdict
 from tankcal.gum.monte_carlo.goal import simulation
 from tankcal.gum.monte_carlo.inputs import inputs_of
-from tankcal.gum.monte_carlo.linear import linear_law, shapes_of
+from tankcal.gum.monte_carlo.linear import LEAST, LONG, SHORT, SPACING, Shape, linear_law, shapes_of
+from tankcal.gum.monte_carlo.quadratic import NEAR, _normal_between, _Roots
 from tankcal.gum.monte_carlo.quadratic_rows import POINTS, SETS
 from tankcal.uncertainty import coverage_factor
 
@@ -176,6 +177,54 @@ def test_law_of_students_t(dof):
     assert law.known[0]
     spread = 2 * np.sqrt(dof / (dof - 2))
     assert law.quantile[0] == pytest.approx(2 * stats.t(dof).ppf([0.025, 0.975]), abs=1e-4 * spread)
+
+
+@pytest.mark.parametrize("step", [0.1 * NEAR, 0.99 * NEAR, 0.5, np.inf])
+def test_probability_between_ends_of_a_normal(step):
+    """Near ends by Taylor's series, others by the function itself; second method: scipy."""
+    first = np.linspace(-4, 4, 201)
+    last = first + step * np.where(np.arange(201) % 2, 1, -1)
+    expected = stats.norm.cdf(last) - stats.norm.cdf(first)
+    np.testing.assert_allclose(_normal_between(first, last.copy()), expected, atol=2e-11)
+    np.testing.assert_allclose(_normal_between(first[0], last[:1].copy()), expected[:1], atol=2e-11)
+
+
+def test_roots_of_parabolas_and_where_there_is_none():
+    """Closed form: the parabola at its root is the gap; beyond its turn +-inf by the side."""
+    half, bend = np.array([[1.0, 1.0, 1.0, -1.0]]), np.array([0.3, 0.0, -1.0, 0.1])
+    gap = np.array([[0.7, -0.7, 2.0, -0.5]])
+    t = _Roots(half, bend)(gap.copy())
+    near = t[0, :2]
+    np.testing.assert_allclose(2 * near + bend[:2] * near**2, gap[0, :2], rtol=1e-15)
+    np.testing.assert_array_equal(t[0, 2:], [np.inf, -np.inf])
+    np.testing.assert_array_equal(_Roots(half[:, :2], bend[:2])(gap[:, :2].copy()), t[:, :2])
+
+
+def test_characteristic_function_of_a_table_that_grows():
+    """Closed form of a rectangular input: sin(t)/t in units of its half-width; 0 beyond."""
+    shape = Shape(Rectangular(2.0), 2.0)
+    for end in (SHORT, LONG):
+        t = np.linspace(0.1, (end - 2) * SPACING, 7)
+        np.testing.assert_allclose(shape.characteristic(t), np.sin(t) / t, atol=3e-7)
+    np.testing.assert_array_equal(shape.characteristic(np.array([LONG * SPACING])), 0.0)
+
+
+@pytest.mark.parametrize("halves", [[1.0, 1.0], [1.0, 0.01]])
+def test_law_of_two_rectangular_inputs_and_little_else(halves):
+    """Closed form: the trapezoid's tail (a + b - y)^2/(8 a b), else (a - y)/(2 a).
+
+    The second, nearly one rectangle, takes thousands of terms. What they leave out is worth some
+    LEAST of probability, where the density is a half.
+    """
+    levels = np.array([0.015, 0.025, 0.035, 0.965, 0.975, 0.985])
+    tail, (a, b) = np.minimum(levels, 1 - levels), halves
+    corner = tail < b / (2 * a)
+    distance = np.where(corner, a + b - np.sqrt(8 * a * b * tail), a * (1 - 2 * tail))
+    law = law_of([1.0, 1.0], [Rectangular(a), Rectangular(b)], levels)
+    assert law.known[0]
+    np.testing.assert_allclose(
+        law.quantile[0], np.where(levels < 0.5, -1, 1) * distance, atol=20 * LEAST
+    )
 
 
 def test_law_of_two_arc_sines_and_a_normal_against_plain_draws():

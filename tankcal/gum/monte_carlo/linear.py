@@ -11,58 +11,59 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import expit, ndtri
 
-SPACING, LENGTH = 0.0025, 1 << 17  # of a table of phi, in units of 1/scale
-FEWEST, MOST = 64, 4096  # terms of the sum
-LEAST = 5e-6  # what the terms left out may be worth, as a probability
+SPACING = 0.0025  # of a table of phi, in units of 1/scale
+SHORT, LONG = 1 << 14, 1 << 17  # values of such a table: FEWEST terms need no more than the first
+FEWEST, MOST = 40, 5120  # terms of the sum
+LEAST = 1e-6  # what the terms left out may be worth, as a probability
 CLOSE = 1e-4  # last step of Newton, in scales: the next one would be some 1e-8
-STRIDE = 16  # terms of which exp(i t y) is a product: of FEWEST a part
-BLOCK = 1 << 18  # numbers held at once
+BLOCK, ROWS = 1 << 18, 256  # numbers held at once, but of so many rows at least
 
 
-@dataclass(frozen=True)
 class Shape:
-    """An input that is not normal, counted from its mean in units of its scale.
+    """The tables of an input that is not normal, counted from its mean in units of a scale.
+
+    The input offers `characteristic(t)`, the real E cos(t (X - mean)).
 
     value, below  (m,) values and the probability below each
-    phi           (LENGTH,) characteristic function at 0, SPACING, 2 SPACING, ...
     reach         value beyond which the density no longer matters for the sum over k
     second, fourth  moments about the mean, within probabilities 1e-13 and 1 - 1e-13
     """
 
-    value: np.ndarray
-    below: np.ndarray
-    phi: np.ndarray
-    reach: float
-    second: float
-    fourth: float
+    def __init__(self, distribution, scale):
+        self._distribution, self._scale = distribution, scale
+        self.below = expit(np.linspace(-30, 30, 4001))
+        quantiles = np.asarray(distribution.quantile(self.below), dtype=float)
+        self.value = (quantiles - distribution.mean) / scale
+        self.reach = float(distribution.quantile(1 - 1e-5) - distribution.mean) / scale
+        moments = (np.trapezoid(self.value**power, self.below) for power in (2, 4))
+        self.second, self.fourth = map(float, moments)
+        self._tabulate(SHORT)
 
-    def cdf(self, value):
-        """Probability below each value."""
-        return np.interp(value, self.value, self.below)
+    def _tabulate(self, length):
+        """The characteristic function at 0, SPACING, 2 SPACING, ..."""
+        phi = self._distribution.characteristic(SPACING / self._scale * np.arange(length))
+        self._phi = np.asarray(phi, dtype=float)
+        self._steps = np.diff(self._phi)
 
     def characteristic(self, t):
-        """E cos(t e), linear between the values of the table; 0 beyond it."""
-        place = np.abs(t) * (1 / SPACING)
-        left = np.minimum(place.astype(np.int32), LENGTH - 2)
-        start = self.phi[left]
-        value = start + (self.phi[left + 1] - start) * (place - left)
-        return np.where(place < LENGTH - 1, value, 0.0)
-
-
-def shape_of(distribution, scale):
-    """The tables of an input that offers `characteristic(t)`, the real E cos(t (X - mean))."""
-    below = expit(np.linspace(-30, 30, 4001))
-    value = (np.asarray(distribution.quantile(below), dtype=float) - distribution.mean) / scale
-    phi = distribution.characteristic(SPACING / scale * np.arange(LENGTH))
-    reach = float(distribution.quantile(1 - 1e-5) - distribution.mean) / scale
-    second, fourth = (float(np.trapezoid(value**power, below)) for power in (2, 4))
-    return Shape(value, below, np.asarray(phi, dtype=float), reach, second, fourth)
+        """E cos(t e) of t not below 0, linear between the values of the table; 0 beyond it."""
+        place = t * (1 / SPACING)
+        most = place.max(initial=0.0)
+        if most >= len(self._steps) and len(self._phi) < LONG:
+            self._tabulate(LONG)
+        left = place.astype(np.intp)
+        value = self._steps.take(left, mode="clip")
+        value *= np.subtract(place, left, out=place)
+        value += self._phi.take(left, mode="clip")
+        if most >= len(self._steps):
+            value[left >= len(self._steps)] = 0.0
+        return value
 
 
 def shapes_of(ready):
     """(n,) Shape of each input that is not normal, None for the others."""
     numbered = zip(ready.distributions, ready.normal, ready.scale, strict=True)
-    return [None if normal else shape_of(one, scale) for one, normal, scale in numbered]
+    return [None if normal else Shape(one, scale) for one, normal, scale in numbered]
 
 
 @dataclass(frozen=True)
@@ -98,10 +99,12 @@ def linear_law(coefficients, normal, shapes, levels):
     pending, terms = np.flatnonzero(count > 0), FEWEST
     while len(pending) and terms <= MOST:
         left = []
-        for block in np.array_split(pending, 1 + len(pending) * terms // BLOCK):
+        for block in np.array_split(pending, 1 + len(pending) // max(BLOCK // terms, ROWS)):
             sums = _Sums(own[block], coefficients[np.ix_(block, others)], chosen, terms)
             done = sums.converged
-            quantile[block[done]], density[block[done]] = sums.solve(done, levels)
+            if not np.all(done):
+                sums.only(done)
+            quantile[block[done]], density[block[done]] = sums.solve(levels)
             known[block[done]] = True
             left.append(block[~done])
         pending, terms = np.concatenate(left), 2 * terms
@@ -116,29 +119,41 @@ class _Sums:
         reach = np.array([shape.reach for shape in shapes])
         half = np.sqrt(36 * own**2 + np.sum((parts * reach) ** 2, axis=1)) / self.scale
         self.spacing = np.pi / np.maximum(half, 6.0)
-        self.order = np.arange(terms) + 0.5
-        self.t = self.spacing[:, None] * self.order
-        t = self.t / self.scale[:, None]
-        self.phi = np.exp(-((own[:, None] * t) ** 2) / 2)
-        for shape, part in zip(shapes, parts.T, strict=True):
-            self.phi *= shape.characteristic(part[:, None] * t)
-        last = np.max(np.abs(self.phi[:, -8:]), axis=1)
-        self.converged = last / (np.pi * self.t[:, -1]) < LEAST
+        order = np.arange(terms)[:, None] + 0.5
+        t = order * (self.spacing / self.scale)
+        phi = np.exp(-((own * t) ** 2) / 2)
+        for shape, part in zip(shapes, np.abs(parts.T), strict=True):
+            phi *= shape.characteristic(part * t)
+        last = np.max(np.abs(phi[-8:]), axis=0)
+        self.converged = last / (np.pi * order[-1] * self.spacing) < LEAST
+        self.phi = np.stack([phi, phi / order], axis=1)  # of the density, of the cdf
 
-    def at(self, y, chosen):
-        """Cdf and density at (rows,) values in units of the scale."""
-        angle = (1j * self.spacing[chosen] * y)[:, None]
-        coarse = np.exp(angle * self.order[::STRIDE])  # exp(i t y) in strides, then within them
-        fine = np.exp(angle * np.arange(STRIDE))
-        phi = self.phi[chosen]
-        waves = (coarse[:, :, None] * fine[:, None, :]).reshape(phi.shape)
-        density = np.einsum("rk,rk->r", phi, waves.real) * self.spacing[chosen] / np.pi
-        cdf = 0.5 + np.einsum("rk,rk,k->r", phi, waves.imag, 1 / self.order) / np.pi
+    def only(self, chosen):
+        """Keep the chosen rows."""
+        self.scale, self.spacing = self.scale[chosen], self.spacing[chosen]
+        self.phi = self.phi[:, :, chosen]
+
+    def at(self, y):
+        """Cdf and density at (rows,) values in units of the scale.
+
+        Both sums by Clenshaw's recurrence, b_k = phi_k + 2 cos(a) b_k+1 - b_k+2, a = y spacing:
+        sum phi_k cos((k + 1/2) a) = cos(a/2) (b_0 - b_1), with sines sin(a/2) (b_0 + b_1).
+        """
+        angle = self.spacing * y
+        twice = 2 * np.cos(angle)
+        first, second, spare = np.zeros((3, *self.phi.shape[1:]))
+        for of_order in self.phi[::-1]:
+            np.multiply(twice, first, out=spare)
+            spare -= second
+            spare += of_order
+            first, second, spare = spare, first, second
+        density = np.cos(angle / 2) * (first[0] - second[0]) * self.spacing / np.pi
+        cdf = 0.5 + np.sin(angle / 2) * (first[1] + second[1]) / np.pi
         return cdf, density
 
-    def solve(self, chosen, levels):
+    def solve(self, levels):
         """(rows, levels) quantiles and densities, by Newton inside a shrinking bracket."""
-        scale, half = self.scale[chosen], np.pi / self.spacing[chosen]
+        scale, half = self.scale, np.pi / self.spacing
         quantile = np.empty((len(scale), len(levels)))
         density = np.empty_like(quantile)
         upper = np.maximum(levels, 1 - levels)
@@ -146,7 +161,7 @@ class _Sums:
             low, high = -half, half.copy()
             y = np.clip(np.full(len(scale), ndtri(level)), -0.9 * half, 0.9 * half)
             for _ in range(60):
-                cdf, slope = self.at(y, chosen)
+                cdf, slope = self.at(y)
                 low, high = np.where(cdf < level, y, low), np.where(cdf < level, high, y)
                 step = np.divide(level - cdf, slope, out=np.full_like(y, np.nan), where=slope > 0)
                 inside = (y + step > low) & (y + step < high)

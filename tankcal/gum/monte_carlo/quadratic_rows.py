@@ -17,6 +17,7 @@ SETS = 10  # independent point sets
 POINTS = 2048  # of a set; intervals take FIRST to MOST of them
 FIRST, MOST = 8, 1024  # eight of each set are mostly worth 1e7 plain draws
 PILOT = 16, 64  # points of the first set that place the ends: at first, and where they are too few
+STILL = 0.01  # of the lowest level: targets on a normal that moved by less are placed
 SIDES = np.array([0.6, 1.0, 1.4])  # levels about an end, by that end's own
 
 
@@ -29,13 +30,13 @@ def table_estimates(model, ready, goal, progress):
     """
     rows = model.in_coordinates(ready.transform)
     sets = _point_sets(ready, goal)
-    forms = np.stack([rows.forms(e) for e in sets])
+    forms = rows.forms(sets.reshape(-1, sets.shape[-1])).reshape(*sets.shape[:2], -1)
     shapes = shapes_of(ready)
     lines = Lines(rows, ready.normal, shapes, ready.coordinate_scale)
     levels = np.concatenate([SIDES * goal.tail, 1 - SIDES[::-1] * goal.tail])
     scaled = rows.jacobian * ready.coordinate_scale
     law = linear_law(scaled, ready.normal, shapes, levels)
-    moments = np.stack([_moments(rows, ready, e, q) for e, q in zip(sets, forms, strict=True)])
+    moments = _moments(rows, ready, sets, forms)
     found = _Ends(lines, law, levels, sets, forms)
     estimates, errors = np.full((2, 6, len(rows.value)), np.nan)  # what nobody fills shows
     estimates[:2], errors[:2] = _mean_and_error(moments)
@@ -84,22 +85,24 @@ def _mean_and_error(sets):
     return np.mean(sets, axis=0), error
 
 
-def _moments(rows, ready, e, forms):
-    """(2, rows) mean and u: exact for the linear part, from the draws for what is added."""
+def _moments(rows, ready, sets, forms):
+    """(sets, 2, rows) mean and u: exact for the linear part, from the draws for what is added."""
     sd = ready.coordinate_sd
     finite = np.isfinite(sd)
     exact = np.einsum("kaa,a->k", rows.hessians[:, finite][:, :, finite], sd[finite] ** 2)
-    middle = np.where(
-        np.any(rows.hessians[:, ~finite] != 0, axis=(1, 2)), forms.mean(axis=0), exact
-    )
-    about = forms - middle
-    mixed, own = e.T @ about / len(e), about.T @ about / len(e)
+    drawn = np.any(rows.hessians[:, ~finite] != 0, axis=(1, 2))
     with np.errstate(invalid="ignore"):
         linear = np.where(rows.jacobian == 0, 0.0, rows.jacobian * sd)
-    variance = np.sum(linear**2, axis=1)
-    variance = variance + 2 * np.sum((rows.jacobian @ mixed) * rows.weights, axis=1)
-    variance = variance + np.sum((rows.weights @ own) * rows.weights, axis=1)
-    return np.stack([rows.value + rows.weights @ middle, np.sqrt(np.maximum(variance, 0.0))])
+    alone = np.sum(linear**2, axis=1)
+    # w' cov(forms) w + 2 j' cov(e, forms) w, both by one product
+    both, found = np.hstack([rows.jacobian, rows.weights]), np.empty((len(sets), 2, len(alone)))
+    for of_set, e, form in zip(found, sets, forms, strict=True):
+        middle = np.where(drawn, form.mean(axis=0), exact)
+        about = form - middle
+        products = np.vstack([2 * e.T @ about, about.T @ about]) / len(e)
+        variance = alone + np.einsum("rk,rk->r", both @ products, rows.weights)
+        of_set[:] = rows.value + rows.weights @ middle, np.sqrt(np.maximum(variance, 0.0))
+    return found
 
 
 class _Ends:
@@ -142,6 +145,8 @@ class _Ends:
             found, _ = self.lines.differences(along, block, pilot, target, self.levels, linear)
             moved = (self.levels - found[0]) / slope
             target = target + moved
+            if along < 0 and np.max(np.abs(moved) * slope) < STILL * self.levels[0]:
+                break  # on others, which may have kinks, the ends hang on the targets
         return target, np.all(np.abs(moved) * slope < 0.1 * self.levels[0], axis=1)
 
     def _scores(self, along, block, target, count):
@@ -174,9 +179,5 @@ class _Ends:
 def _through(x, y, at):
     """Parabolas through three points each, x (..., rows, 3) and y (rows, 3), at one place each."""
     a, b, c = np.moveaxis(x, -1, 0)
-    first, second, third = (at - a), (at - b), (at - c)
-    return (
-        y[:, 0] * second * third / ((a - b) * (a - c))
-        + y[:, 1] * first * third / ((b - a) * (b - c))
-        + y[:, 2] * first * second / ((c - a) * (c - b))
-    )
+    first, second = (y[:, 1] - y[:, 0]) / (b - a), (y[:, 2] - y[:, 1]) / (c - b)
+    return y[:, 0] + (at - a) * (first + (at - b) * ((second - first) / (c - a)))
