@@ -61,3 +61,28 @@ def test_unknowns_are_solved_once_per_observation_set_aside(monkeypatch):
     monkeypatch.setattr(separability, "WORTH", 0.0)
     alternatives(found, "image points", 5)
     assert len(asked) == 1
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_bound_of_the_test_leaves_out_no_alternative(seed, monkeypatch, figure):
+    """Second method: without the bound, every reading that stands out is tested in full."""
+    measurements = by_photographs(seed, photos=8)[0]
+    images = measurements.image_points
+    xy = images.xy_mm.copy()
+    xy[7::15] += 0.04 * np.random.default_rng(1).normal(size=xy[7::15].shape)
+    blundered = replace(measurements, image_points=replace(images, xy_mm=xy))
+    found = adjust_survey(
+        replace(blundered, settings=replace(measurements.settings, explain=False))
+    ).adjusted
+    monkeypatch.setattr(separability, "WORTH", 0.0)
+    rows = np.flatnonzero(found.survey.image_points.use == 0)
+    bounded = [alternatives(found, "image points", int(row)) for row in rows]
+    bound, kept = separability._may_explain, []
+    monkeypatch.setattr(
+        separability,
+        "_may_explain",
+        lambda v, *of: kept.append(bound(v, *of)) or np.ones(len(v), dtype=bool),
+    )
+    assert bounded == [alternatives(found, "image points", int(row)) for row in rows]
+    assert any(bounded)
+    figure("alternatives, share of readings that the bound leaves", np.concatenate(kept).mean())

@@ -17,7 +17,13 @@ Without j in its place, i is tested by
     T = u' M^-1 u,   u = v_i - R_ij R_j^-1 v_j,   M = R_i - R_ij R_j^-1 R_ji
 
 and j may be the blunder as well when T is insignificant (0.1 %) and j itself is not. Image points
-are pairs, here as in the search. A coordinate that is held is released: with its reaction g and
+are pairs, here as in the search. Most j are told apart without J_j Q J_j', whose eigenvalues are
+not negative and add up to m less the redundancy numbers of j. So none of R_j is below l = sum r -
+(m - 1); M <= R_i; and by Cauchy and Schwarz
+
+    sqrt T >= sqrt(v_i' S v_i) - sqrt(tr B S^-1 B') |v_j| / l
+
+A coordinate that is held is released: with its reaction g and
 square q (see `reactions`), and r = C_i + J X, both become g - r' S^-1 e and q + r' S^-1 r.
 Source: Foerstner 1983, Reliability and discernability of extended Gauss-Markov models.
 """
@@ -42,6 +48,7 @@ from tankcal.survey.network.reactions import HELD
 LIMITS = (0.0, CRITICAL**2, *(float(chdtri(count, ALPHA)) for count in range(2, 7)))
 WORTH = 0.5 * CRITICAL**2  # w^2 of a single value from which its observation is looked at
 LOOKED_AT = 200  # observations of a group, the worst
+FIRM = 0.05  # least eigenvalue of R_j with which the bound of T is asked
 
 
 def alternatives(adjusted, source, row, held=None):
@@ -161,16 +168,32 @@ def _near(solution, problem, table, number, b, aside):
     """Observations that stand out with i back: place, v_j, R_j, B."""
     inverse, back = aside.inverse, aside.back
     v = table.residual / table.sd - b @ back
-    r = table.redundancy + np.einsum("nmd,nmd->nm", b @ inverse, b)
+    shared = np.einsum("nmd,nmd->nm", b @ inverse, b)
+    r = table.redundancy + shared
     square = np.where(r > UNCONTROLLED, v**2 / np.maximum(r, UNCONTROLLED), 0.0).max(axis=1)
     near = np.flatnonzero(table.used & (square > WORTH) & (b != 0).any(axis=(1, 2)))
     near = near[np.argsort(-square[near], kind="stable")][:LOOKED_AT]
+    near = near[_may_explain(v[near], table.redundancy[near], shared[near].sum(axis=1), aside)]
     if not len(near):
         return
     columns = problem.model.groups[number].columns[near]
     jac = solution.cofactor.jacobians[number][near]
     for j, own in zip(near, cofactors_within(solution.cofactor, columns, jac), strict=True):
         yield j, v[j], np.eye(len(own)) - own + b[j] @ inverse @ b[j].T, b[j]
+
+
+def _may_explain(v, redundancy, shared, aside):
+    """(n,) whether T of the observation aside without these (n, m) may be small, by its bound.
+
+    shared  (n,) tr B S^-1 B'
+    """
+    least = redundancy.sum(axis=1) - (redundancy.shape[1] - 1)
+    # where j shares no more than half of what i has left, all values of i stay controlled
+    told = (least >= FIRM) & (2 * shared <= least)
+    if np.linalg.eigvalsh(aside.inverse)[0] <= 2 * UNCONTROLLED:
+        told[:] = False
+    moved = np.sqrt(shared) * np.linalg.norm(v, axis=1) / np.where(told, least, 1.0)
+    return ~told | (moved >= np.sqrt(aside.e @ aside.back) - np.sqrt(LIMITS[len(aside.e)]))
 
 
 def _tests(v, cofactors, cross, aside):
