@@ -1,6 +1,8 @@
 """Plain data: what JSON can hold, made of numbers, arrays, tuples and dicts."""
 
+import ctypes
 import gc
+import sys
 from contextlib import contextmanager
 from dataclasses import is_dataclass
 from math import isfinite
@@ -89,6 +91,18 @@ def without_collection():
     finally:
         if was_on:
             gc.enable()
+
+
+def return_freed_memory():
+    """Give memory that was freed back to the machine: what computing leaves is in many pieces.
+
+    Of a survey with 90 000 image points a hundred megabytes, which the C library of Linux would
+    keep while the papers are set; others have no such function, and nothing is done.
+    """
+    if sys.platform == "linux":
+        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+        if trim:
+            trim(0)
 
 
 def columns_of(rows, names=()):

@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from tankcal.errors import TankcalError
+from tankcal.record.plain_data import return_freed_memory
 from tankcal.report import attachments
 from tankcal.report.blocks import WEB_ONLY
 from tankcal.report.page_tables import prepared
@@ -51,6 +52,8 @@ def _compile(files, timestamp):
     theirs, and where that is not enough nobody does.
     """
     import typst
+
+    return_freed_memory()  # of which nothing would serve the typesetter
 
     def compiled(ignore_system_fonts, places=PLACES):
         found, warnings = typst.compile_with_warnings(

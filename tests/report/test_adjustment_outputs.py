@@ -2,10 +2,13 @@
 
 import copy
 import csv
+import ctypes
 import gc
 import json
+import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -26,7 +29,7 @@ from tankcal.job.covariance import read_covariance
 from tankcal.pipeline.chain import adjust_job
 from tankcal.record.adjusted import _edge_effect, adjusted_points_of
 from tankcal.record.adjustment import _group
-from tankcal.record.plain_data import rows_of, without_collection
+from tankcal.record.plain_data import return_freed_memory, rows_of, without_collection
 from tankcal.report import attachments, outputs, workbook
 from tankcal.report.document import blocks_of
 from tankcal.report.notebook import execute, joined
@@ -564,6 +567,27 @@ def test_writing_lets_the_garbage_collector_rest_and_wakes_it():
     with pytest.raises(ZeroDivisionError), without_collection():
         print(1 / 0)
     assert gc.isenabled()
+
+
+def resident_mb():
+    """What this process holds in memory, MB (Linux)."""
+    text = Path("/proc/self/status").read_text(encoding="ascii")
+    return int(re.search(r"VmRSS:\s+(\d+)", text)[1]) / 1000
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no malloc_trim")
+def test_freed_memory_is_given_back(figure):
+    """Property: pieces between others that are kept leave the process, too."""
+    if not hasattr(ctypes.CDLL(None), "malloc_trim"):
+        pytest.skip("this C library has no malloc_trim")
+    pieces = [bytes(1000) for _ in range(60_000)]
+    kept = pieces[::100]
+    del pieces
+    before = resident_mb()
+    return_freed_memory()
+    figure("freed memory given back, MB", before - resident_mb())
+    assert len(kept) == 600
+    assert before - resident_mb() > 30
 
 
 def test_network_plan_computes_its_extent_twice(only, monkeypatch):
