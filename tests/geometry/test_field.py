@@ -13,7 +13,7 @@ from tankcal.geometry.field.cells import cells_of, sites_of_cells
 from tankcal.geometry.field.components import (
     COMPONENTS,
     azimuth_correlations,
-    joint_profile,
+    joint_profiles,
     plate_profiles,
     seam_correlation,
 )
@@ -87,9 +87,9 @@ def test_a_component_of_unit_variance_has_unit_rms(one):
         assert weight @ one.height_covariance(node, np.array([0.3]))[:, 0] == pytest.approx(0.0)
 
 
-def test_the_profile_of_joints_has_no_mean():
+def test_profiles_of_joints_have_no_mean():
     node, weight = np.polynomial.legendre.leggauss(400)
-    assert weight @ joint_profile(node) == pytest.approx(0.0, abs=1e-4)
+    assert weight @ joint_profiles(node) == pytest.approx(np.zeros(2), abs=1e-4)
 
 
 def test_a_plate_bulges_between_a_parabola_and_a_bell():
