@@ -118,8 +118,8 @@ _LINEAR = (0, 1)
 COMPONENTS = (
     Component("common bulge", "bulge", "mean", True, "plate", 1.0e-3, 1.0, "barrel"),
     Component("drawn-in joints", "bulge", "mean", True, "joints", 0.9e-3, 1.0, "barrel"),
-    Component("own bulge", "bulge", "mean", False, _FREE, 0.65e-3, 1.0, "barrel"),
-    Component("taper", "bulge", "mean", False, _LINEAR, 0.45e-3, 1.5, "taper"),
+    Component("own bulge", "bulge", "mean", False, _FREE, 0.7e-3, 1.0, "barrel"),
+    Component("taper", "bulge", "mean", False, _LINEAR, 0.5e-3, 1.5, "taper"),
     Component("common ovality", "ovality", "oval", True, _LEVEL, 4e-3, 2.0),
     Component("own ovality", "ovality", "oval", False, _LEVEL, 2e-3, 2.0),
     Component("turning ovality", "ovality", "oval", False, _LINEAR, 1e-3, 2.0),
