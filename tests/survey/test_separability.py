@@ -1,6 +1,7 @@
 """What may be wrong in place of an image point that was set aside: coordinates as pairs."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -83,3 +84,35 @@ def test_bound_of_the_test_leaves_out_no_alternative(seed, monkeypatch, figure):
     assert bounded == [alternatives(found, "image points", int(row)) for row in rows]
     assert any(bounded)
     figure("alternatives, share of readings that the bound leaves", np.concatenate(kept).mean())
+
+
+def test_bound_of_the_test_is_never_above_the_test_itself():
+    """Second method: pairs of random surveys, one set aside, tested again without another one."""
+    rng, limit, left_out, kept = np.random.default_rng(5), separability.LIMITS[2], 0, 0
+    for _ in range(400):
+        design, y = rng.normal(size=(30, 3)), rng.normal(size=30)
+        own, other, rest = slice(0, 2), slice(2, 4), slice(4, None)
+
+        def solved(rows, design=design, y=y):
+            inverse = np.linalg.inv(design[rows].T @ design[rows])
+            return inverse, inverse @ design[rows].T @ y[rows]
+
+        y[other] += 5 * rng.normal(size=2)
+        inverse, x = solved(slice(2, None))
+        cofactors = np.linalg.inv(np.eye(2) + design[own] @ inverse @ design[own].T)
+        e = y[own] - design[own] @ x
+        e *= rng.uniform(0.8, 1.8) * np.sqrt(limit / (e @ cofactors @ e))
+        y[own] = design[own] @ x + e
+        aside = SimpleNamespace(e=e, inverse=cofactors, back=cofactors @ e)
+        b = design[other] @ inverse @ design[own].T
+        v = y[other] - design[other] @ x - b @ aside.back
+        redundancy = 1 - np.diag(design[other] @ inverse @ design[other].T)
+        shared = np.trace(b @ cofactors @ b.T)
+        may = separability._may_explain(v[None], redundancy[None], np.array([shared]), aside)[0]
+        inverse, x = solved(rest)
+        e = y[own] - design[own] @ x
+        t = e @ np.linalg.solve(np.eye(2) + design[own] @ inverse @ design[own].T, e)
+        assert may or t > limit
+        left_out, kept = left_out + (not may), kept + (t <= limit)
+    assert left_out > 40
+    assert kept > 40
