@@ -13,7 +13,8 @@ from tankcal.geometry.field.cells import cells_of, sites_of_cells
 from tankcal.geometry.field.components import (
     COMPONENTS,
     azimuth_correlations,
-    joint_profile,
+    joint_profiles,
+    log_covariance,
     plate_profiles,
     seam_correlation,
 )
@@ -87,9 +88,34 @@ def test_a_component_of_unit_variance_has_unit_rms(one):
         assert weight @ one.height_covariance(node, np.array([0.3]))[:, 0] == pytest.approx(0.0)
 
 
-def test_the_profile_of_joints_has_no_mean():
+def test_profiles_of_joints_have_no_mean():
     node, weight = np.polynomial.legendre.leggauss(400)
-    assert weight @ joint_profile(node) == pytest.approx(0.0, abs=1e-4)
+    assert weight @ joint_profiles(node) == pytest.approx(np.zeros(2), abs=1e-4)
+
+
+def test_sizes_of_joints_and_seams_are_more_alike_than_others():
+    """By hand: 0.05 of any two, and 0.09 more of what welds make."""
+    covariance, names = log_covariance(), [one.name for one in COMPONENTS]
+    sd = np.sqrt(np.diag(covariance))
+    assert sd == pytest.approx([one.log_sd for one in COMPONENTS])
+    alike = covariance / np.outer(sd, sd)
+    joints, bulge, dents = (
+        names.index(one) for one in ("drawn-in joints", "common bulge", "dents")
+    )
+    assert alike[joints, [bulge, dents]] == pytest.approx([0.05, 0.14])
+    assert alike[bulge, dents] == pytest.approx(0.05)
+    assert np.linalg.eigvalsh(covariance)[0] > 0.5
+
+
+def test_a_rough_form_expects_more_of_the_bulge_that_one_ring_does_not_show():
+    sites, rng = sites_of(4, [0.0], 36), np.random.default_rng(3)
+    noise, found = np.full(len(sites), 1e-6), []
+    for rough_m in (0.0, 0.004):
+        form = rough_m * rng.normal(size=36)  # the same up the whole shell
+        radius = RADIUS_M + form[np.arange(len(sites)) % 36] + 1e-3 * rng.normal(size=len(sites))
+        found.append(estimate_amplitudes(sites, radius, noise, RADIUS_M).variances_m2[:2])
+    assert np.all(found[1] > 1.1 * found[0])
+    assert np.all(found[0] < [one.median_m**2 * np.exp(0.5) for one in COMPONENTS[:2]])
 
 
 def test_a_plate_bulges_between_a_parabola_and_a_bell():

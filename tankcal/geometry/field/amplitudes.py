@@ -1,7 +1,7 @@
 """How large the components of a wall are, learned from what was measured.
 
-Each logarithm of a variance is normal beforehand (`components`); the amplitudes are those of the
-highest density given the readings (`likelihood`), and the curvature there is how well they are
+The logarithms of the variances are normal beforehand (`components`); the amplitudes are those of
+the highest density given the readings (`likelihood`), and the curvature there is how well they are
 known.
 """
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.geometry.field.components import COMPONENTS
+from tankcal.geometry.field.components import COMPONENTS, log_covariance
 from tankcal.geometry.field.evidence import likelihood_of
 from tankcal.geometry.field.likelihood import LEAST_M
 
@@ -74,8 +74,8 @@ def assumed_amplitudes(ovality_m=None, common_ovality_m=None):
     Amplitudes
     """
     size = np.array([one.median_m for one in COMPONENTS]) ** 2
-    before = np.array([one.log_sd for one in COMPONENTS])
-    log_sd = before.copy()
+    covariance = log_covariance()
+    before = np.sqrt(np.diag(covariance))
     if ovality_m is not None:
         common = min(common_ovality_m or 0.0, ovality_m)
         for name, given in (
@@ -83,8 +83,9 @@ def assumed_amplitudes(ovality_m=None, common_ovality_m=None):
             ("own ovality", np.sqrt(ovality_m**2 - common**2)),
         ):
             place = [one.name for one in COMPONENTS].index(name)
-            size[place], log_sd[place] = max(given, LEAST_M) ** 2, 0.0
-    return Amplitudes(size, np.diag(log_sd**2), before)
+            size[place] = max(given, LEAST_M) ** 2
+            covariance[place] = covariance[:, place] = 0.0
+    return Amplitudes(size, covariance, before)
 
 
 def estimate_amplitudes(

@@ -11,7 +11,8 @@ covariance
 
 so that its amplitude, the root of its variance, is the rms departure that it makes. It is the same
 in all courses, or each course has its own. How large it is a survey tells in part; before it, the
-logarithm of the variance is normal: about that of `median_m`, with `log_sd`.
+logarithm of the variance is normal: about that of `median_m`, with `log_sd`, and a shell that is
+large in one is more likely large in another (`log_covariance`).
 """
 
 from dataclasses import dataclass
@@ -26,9 +27,11 @@ OVALITY_MODES = np.arange(2.0, 37.0)
 OVALITY_WEIGHTS = OVALITY_MODES**-3 / np.sum(OVALITY_MODES**-3)
 SEAM_LENGTH_M = 0.4  # along the arc, of a seam's flank
 WELD_LENGTH_M = 0.2  # the same of a peak at a weld, which is 0.8 m wide in all
-JOINT_LENGTH = 0.2  # of half a course: how far a joint draws the plate in
+JOINT_LENGTHS = (0.1, 0.25)  # of half a course: how far a joint draws the plate in
 LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
 BELL, BELL_SD = 1.0, 0.4  # of the way from a parabola to a plate whose joints do not turn
+WORKMANSHIP = 0.05  # correlation of the sizes of any two components of a shell
+SHRINKAGE = 0.09  # the same, besides, of two that its welds make: joints and seams
 
 _LEVEL = (1,)
 KINDS = ("bulge", "ovality", "seams")
@@ -54,8 +57,8 @@ class Component:
         The same in all courses.
     orders : tuple of float, str
         Variances of the Legendre polynomials 0, 1, ... in the height, up to a factor; "plate": of
-        the profiles of `plate_profiles`; "joints": the profile exp(-(1 - |zeta|) / JOINT_LENGTH)
-        less its mean; "local": the covariance exp(-|zeta - zeta'| / LOCAL_LENGTH).
+        the profiles of `plate_profiles`; "joints": of those of `joint_profiles`; "local": the
+        covariance exp(-|zeta - zeta'| / LOCAL_LENGTH).
     median_m, log_sd : float
         Median of its amplitude, m, and standard deviation of the logarithm of its variance.
     declared_as : str
@@ -74,7 +77,7 @@ class Component:
     def height_columns(self, zeta):
         """(n, r) columns whose products are h; not of a component that is local."""
         if self.orders == "joints":
-            return joint_profile(zeta)[:, None]
+            return joint_profiles(zeta)
         if self.orders == "plate":
             return plate_profiles(zeta)
         used, scale = self._scales
@@ -114,7 +117,7 @@ _FREE = (0, 0, *(order**-2.0 for order in range(2, 7)))
 _LINEAR = (0, 1)
 COMPONENTS = (
     Component("common bulge", "bulge", "mean", True, "plate", 1.0e-3, 1.0, "barrel"),
-    Component("drawn-in joints", "bulge", "mean", True, "joints", 0.8e-3, 1.0, "barrel"),
+    Component("drawn-in joints", "bulge", "mean", True, "joints", 0.9e-3, 1.0, "barrel"),
     Component("own bulge", "bulge", "mean", False, _FREE, 0.7e-3, 1.0, "barrel"),
     Component("taper", "bulge", "mean", False, _LINEAR, 0.5e-3, 1.5, "taper"),
     Component("common ovality", "ovality", "oval", True, _LEVEL, 4e-3, 2.0),
@@ -126,6 +129,19 @@ COMPONENTS = (
     Component("peaking", "seams", "weld", True, _LEVEL, 3e-3, 1.2),
     Component("own peaks", "seams", "weld", False, _LEVEL, 2e-3, 1.2),
 )
+
+
+def log_covariance():
+    """(components, components) of the logarithms of the variances, before the survey.
+
+    Plates that are badly rolled and fitted leave a shell that is rough in every way; what welds
+    draw in when they shrink is peaking at the vertical and banding at the girth ones.
+    """
+    welded = np.array([one.kind == "seams" or one.orders == "joints" for one in COMPONENTS])
+    alike = WORKMANSHIP + SHRINKAGE * np.outer(welded, welded)
+    np.fill_diagonal(alike, 1.0)
+    log_sd = np.array([one.log_sd for one in COMPONENTS])
+    return alike * np.outer(log_sd, log_sd)
 
 
 def legendre(zeta, highest):
@@ -151,12 +167,20 @@ def plate_profiles(zeta):
     return legendre(zeta, 4)[:, [2, 4]] @ shapes.T
 
 
-def joint_profile(zeta):
-    """(n,) how a joint draws the plate in, of mean zero and mean square one over a course."""
-    w = JOINT_LENGTH
+def joint_profiles(zeta):
+    """(n, 2) columns whose products are h of a plate that its joints draw in, near them.
+
+    Each is exp(-(1 - |zeta|) / w) less its mean, of mean square a half; w of JOINT_LENGTHS, for
+    what a girth weld draws in is lost over about sqrt(R t) / 1.3 of a plate t thick (the edge
+    effect of a cylinder): 0.1 m of a small tank, 0.3 m of a large one.
+
+    Source: Timoshenko & Woinowsky-Krieger 1959, section 114.
+    """
+    w = np.array(JOINT_LENGTHS)
     mean = w * (1 - np.exp(-1 / w))
     square = w / 2 * (1 - np.exp(-2 / w)) - mean**2
-    return (np.exp(-(1 - np.abs(zeta)) / w) - mean) / np.sqrt(square)
+    below = (1 - np.abs(np.asarray(zeta, dtype=float)))[:, None]
+    return (np.exp(-below / w) - mean) / np.sqrt(len(w) * square)
 
 
 def oval_columns(azimuth_rad):

@@ -45,5 +45,6 @@ def expect_amplitudes(field):
         for i, size in enumerate(sizes)
     ]
     told = np.array([[0.5 * np.sum(one * other.T) for other in shares] for one in shares])
-    before = np.maximum(np.diag(amplitudes.log_covariance), HELD**2)
-    return replace(amplitudes, log_covariance=np.linalg.inv(np.diag(1 / before) + told))
+    held = np.diag(amplitudes.log_covariance) == 0
+    before = np.linalg.inv(amplitudes.log_covariance + HELD**2 * np.diag(held))
+    return replace(amplitudes, log_covariance=np.linalg.inv(before + told))

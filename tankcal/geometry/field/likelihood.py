@@ -101,8 +101,10 @@ class Likelihood:
         Covariances of the common values at unit variance.
     wide : ndarray, shape (k,)
         Variances of the common values that no variance scales: of those that no prior binds.
-    middle, log_sd : ndarray, shape (variances,)
+    middle : ndarray, shape (variances,)
         Of the logarithms beforehand.
+    before : ndarray, shape (variances, variances)
+        Covariance of the logarithms beforehand.
     bounds : ndarray, shape (variances, 2)
         Of the logarithms.
     """
@@ -113,8 +115,18 @@ class Likelihood:
     spread: np.ndarray
     wide: np.ndarray
     middle: np.ndarray
-    log_sd: np.ndarray
+    before: np.ndarray
     bounds: np.ndarray
+
+    @cached_property
+    def log_sd(self):
+        """(variances,) standard deviations of the logarithms beforehand."""
+        return np.sqrt(np.diag(self.before))
+
+    @cached_property
+    def precision(self):
+        """(variances, variances) inverse of their covariance beforehand."""
+        return np.linalg.inv(self.before)
 
     def misfit(self, logs):
         """Doubled negative logarithm of the density but for a constant, and its derivative."""
@@ -166,27 +178,32 @@ class Likelihood:
     def _inverse(self, curvature):
         """Of a curvature of the misfit, that is never below the prior's."""
         values, vectors = np.linalg.eigh(curvature)
-        return (vectors / np.maximum(values, 2 / self.log_sd.max() ** 2)) @ vectors.T
+        least = 2 / np.linalg.eigvalsh(self.before)[-1]
+        return (vectors / np.maximum(values, least)) @ vectors.T
 
 
-def prior_of(components, noise_m2=None):
-    """Middle, standard deviations and bounds of the logarithms of variances.
+def prior_of(components, before=None, noise_m2=None):
+    """Middle, covariance and bounds of the logarithms of variances.
 
     Parameters
     ----------
     components : sequence
         With `median_m` and `log_sd`.
+    before : ndarray, shape (components, components), optional
+        Covariance of the logarithms; without it each is independent of the others.
     noise_m2 : ndarray, optional
         Variances of the readings, where a factor of them is asked, too.
     """
     middle = 2 * np.log([one.median_m for one in components])
-    log_sd = np.array([one.log_sd for one in components])
+    if before is None:
+        before = np.diag([one.log_sd**2 for one in components])
     bounds = np.tile(2 * np.log([LEAST_M, MOST_M]), (len(middle), 1))
     if noise_m2 is None:
-        return middle, log_sd, bounds
+        return middle, before, bounds
     noise = 2 * np.log(NOISE_MEDIAN_M) - np.log(np.median(noise_m2))
     bounds = np.vstack([bounds, noise + MOST_OF_NOISE * np.array([-1.0, 1.0])])
-    return np.append(middle, noise), np.append(log_sd, NOISE_LOG_SD), bounds
+    before = scipy.linalg.block_diag(before, NOISE_LOG_SD**2)
+    return np.append(middle, noise), before, bounds
 
 
 def invert(covariance):

@@ -32,7 +32,8 @@ class Misfit:
 
     def __init__(self, likelihood, logs):
         self._likelihood, self._variances = likelihood, np.exp(logs)
-        self._away = (logs - likelihood.middle) / likelihood.log_sd
+        away = logs - likelihood.middle
+        self._by_prior = likelihood.precision @ away  # half the derivative
         before = np.diag(likelihood.wide)
         before += np.tensordot(self._variances[likelihood.common], likelihood.spread, 1)
         half = np.linalg.cholesky(rounded(before))
@@ -51,13 +52,12 @@ class Misfit:
         self._common = self._root @ (self._root.T @ right)  # the common values, estimated
         self._pull = right - self._normal @ self._common  # E' P y
         value += told[-1, -1] - right @ self._common + 2 * np.sum(np.log(np.diag(root)))
-        self.value = value + self._away @ self._away
+        self.value = value + away @ self._by_prior
 
     @cached_property
     def slope(self):
         """(variances,) derivative by the logarithms."""
-        by_prior = 2 * self._away / self._likelihood.log_sd
-        return self._variances * self._by_variances + by_prior
+        return self._variances * self._by_variances + 2 * self._by_prior
 
     @property
     def curvature(self):
@@ -70,8 +70,8 @@ class Misfit:
         return self._of_logs(self._squares())
 
     def _of_logs(self, by_variances):
-        along = self._variances * self._by_variances + 2 / self._likelihood.log_sd**2
-        return self._variances[:, None] * by_variances * self._variances + np.diag(along)
+        along = np.diag(self._variances * self._by_variances) + 2 * self._likelihood.precision
+        return self._variances[:, None] * by_variances * self._variances + along
 
     @cached_property
     def _parts(self):

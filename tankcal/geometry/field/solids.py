@@ -54,7 +54,7 @@ def estimate_sizes(places, design, distance_m, noise_m2, *, estimate_noise=False
         fixed = fixed + noise
     part = Part(left.T @ distance_m, np.array(own), fixed, np.zeros((len(fixed), 0)))
     none, no_values = np.zeros(0, dtype=int), np.zeros((0, 0, 0))
-    prior = prior_of(places.departures, np.diag(noise_m2) if estimate_noise else None)
+    prior = prior_of(places.departures, noise_m2=np.diag(noise_m2) if estimate_noise else None)
     likelihood = Likelihood((part,), np.arange(len(own)), none, no_values, np.zeros(0), *prior)
     return most_likely(likelihood, len(places.departures))
 
