@@ -230,7 +230,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     to_fit = _to_fit(job, shell, accepted, groups, covariance)
     nominal = job.tank.nominal_diameter_m / 2
     samples = [sample_of(*one) for one in to_fit]
-    sites, means = _sites(groups, samples, nominal, _welds(job))
+    sites, means = _sites(groups, samples, nominal, _welds(job), job.tangents is not None)
     undecided = means @ undecided_halves(shell, accepted, groups)
     radius = means @ np.concatenate([one.radius_m for one in samples]) - undecided.sum(axis=1)
     noise = (means @ scipy.sparse.block_diag(_blocks(samples)) @ means.T).toarray()
@@ -338,7 +338,7 @@ def _welds(job):
     return given if any(map(len, given)) else ()
 
 
-def _sites(groups, samples, nominal_m, welds_rad):
+def _sites(groups, samples, nominal_m, welds_rad, limbs):
     """`Sites` of the field, and (sites, points) weights of the points in each: one, or a cell."""
     counts = [len(one.radius_m) for one in samples]
     sites = Sites(
@@ -348,6 +348,7 @@ def _sites(groups, samples, nominal_m, welds_rad):
         azimuth_rad=np.concatenate([one.azimuth_rad for one in samples]),
         leans=np.repeat([one.degree > 0 for one in groups], counts),
         welds_rad=welds_rad,
+        limbs=limbs,
     )
     if len(sites) <= MOST_SITES:
         return sites, scipy.sparse.eye_array(len(sites), format="csr")

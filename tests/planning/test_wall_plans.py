@@ -172,7 +172,10 @@ def test_u_of_tangents_on_generated_walls_study(tmp_path, figure):
             wall = make_wall(rng, family, radius_m=7.5, courses=6)
             job, *known = tangent_job(rng, wall, folder=tmp_path / "limbs", stations=8)
             found, table, _ = table_of_limbs(job, *known)
-            planned, amplitudes = seen_as_planned(job, known[0], found), assumed_amplitudes()
+            planned, amplitudes = (
+                seen_as_planned(job, known[0], found),
+                assumed_amplitudes(limbs=True),
+            )
             first, _, _ = table_of_limbs(planned, *known, amplitudes)
             expected = expect_amplitudes(first.field)
             _, foreseen, _ = table_of_limbs(planned, *known, expected)

@@ -116,10 +116,10 @@ class Component:
 _FREE = (0, 0, *(order**-2.0 for order in range(2, 7)))
 _LINEAR = (0, 1)
 COMPONENTS = (
-    Component("common bulge", "bulge", "mean", True, "plate", 1.0e-3, 1.0, "barrel"),
-    Component("drawn-in joints", "bulge", "mean", True, "joints", 0.9e-3, 1.0, "barrel"),
-    Component("own bulge", "bulge", "mean", False, _FREE, 0.7e-3, 1.0, "barrel"),
-    Component("taper", "bulge", "mean", False, _LINEAR, 0.5e-3, 1.5, "taper"),
+    Component("common bulge", "bulge", "mean", True, "plate", 0.95e-3, 1.0, "barrel"),
+    Component("drawn-in joints", "bulge", "mean", True, "joints", 0.85e-3, 1.0, "barrel"),
+    Component("own bulge", "bulge", "mean", False, _FREE, 0.62e-3, 1.0, "barrel"),
+    Component("taper", "bulge", "mean", False, _LINEAR, 0.45e-3, 1.5, "taper"),
     Component("common ovality", "ovality", "oval", True, _LEVEL, 4e-3, 2.0),
     Component("own ovality", "ovality", "oval", False, _LEVEL, 2e-3, 2.0),
     Component("turning ovality", "ovality", "oval", False, _LINEAR, 1e-3, 2.0),
@@ -131,16 +131,20 @@ COMPONENTS = (
 )
 
 
-def log_covariance():
+def log_covariance(limbs=False):
     """(components, components) of the logarithms of the variances, before the survey.
 
     Plates that are badly rolled and fitted leave a shell that is rough in every way; what welds
-    draw in when they shrink is peaking at the vertical and banding at the girth ones.
+    draw in when they shrink is peaking at the vertical and banding at the girth ones. Limbs show
+    every wall smoother than it is, for they pass over its valleys: of those (limbs True) no size
+    tells of another.
     """
+    log_sd = np.array([one.log_sd for one in COMPONENTS])
+    if limbs:
+        return np.diag(log_sd**2)
     welded = np.array([one.kind == "seams" or one.orders == "joints" for one in COMPONENTS])
     alike = WORKMANSHIP + SHRINKAGE * np.outer(welded, welded)
     np.fill_diagonal(alike, 1.0)
-    log_sd = np.array([one.log_sd for one in COMPONENTS])
     return alike * np.outer(log_sd, log_sd)
 
 

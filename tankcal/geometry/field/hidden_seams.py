@@ -16,7 +16,7 @@ import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
 
-DEPTH_M, PART, WIDTH_M = 0.020, 0.00265, 0.8  # of a seam; depth as a part of the radius at most
+DEPTH_M, PART, WIDTH_M = 0.035, 0.0046, 0.8  # of a seam; depth as a part of the radius at most
 SAME_RAD = 1e-9  # azimuths that differ by rounding alone
 PLACES = 2**14  # round the shell, at which the columns of two courses are compared
 

@@ -32,6 +32,8 @@ class Sites:
         Derivative of the radii by unknowns that courses share: the constant of a plumb line.
     points : tuple of ndarray, shape (p,), optional
         Course and azimuth of the points that the sites are means of.
+    limbs : bool
+        Whether lines of sight touched the wall, which pass over its valleys.
     """
 
     course: np.ndarray
@@ -42,6 +44,7 @@ class Sites:
     welds_rad: tuple = ()
     shared: np.ndarray | None = None
     points: tuple | None = None
+    limbs: bool = False
 
     def __len__(self):
         return len(self.course)
@@ -58,6 +61,7 @@ class Sites:
             welds_rad=tuple(self.welds_of(one) for one in seen) if self.welds_rad else (),
             shared=None if self.shared is None else self.shared[chosen],
             points=None if self.points is None else _of_courses(*self.points, seen),
+            limbs=self.limbs,
         )
 
     @property
