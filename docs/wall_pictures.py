@@ -25,8 +25,14 @@ def components():
     for one in COMPONENTS:
         if one.name in shown:
             colour, sign = shown[one.name]
-            profile = sign * 1e3 * one.median_m * one.height_columns(zeta)[:, 0]
-            left.plot(profile, zeta, color=colour, label=one.name)
+            profiles = sign * 1e3 * one.median_m * one.height_columns(zeta)
+            if one.orders == "joints":  # each as if it were alone
+                profiles = profiles * np.sqrt(profiles.shape[1])
+            else:
+                profiles = profiles[:, :1]
+            left.plot(
+                profiles, zeta, color=colour, label=[one.name, *["_"] * 9][: profiles.shape[1]]
+            )
     left.set(xlabel="radius / mm", ylabel="height in the course", ylim=(-1, 1))
     left.set_yticks([-1, 0, 1], ["joint", "middle", "joint"])
     arc = np.linspace(0, 4, 400)

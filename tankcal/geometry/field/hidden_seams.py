@@ -66,7 +66,7 @@ def hidden_seams_m(azimuth_rad, radius_m):
     Examples
     --------
     >>> round(1e3 * hidden_seams_m(np.arange(72) * FULL_TURN / 72, 7.5), 2)
-    0.11
+    0.2
     """
     return _size_m(_columns(azimuth_rad)[1], radius_m)
 
