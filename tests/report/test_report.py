@@ -11,7 +11,7 @@ import pytest
 from nbclient import NotebookClient
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
-from tankcal.errors import TankcalError
+from tankcal.errors import CellError, TankcalError
 from tankcal.report import FILES, blocks, build
 from tankcal.report.document import PARTS, blocks_of, last_cell
 from tankcal.report.latex_math import _FUNCTIONS, _GREEK, _OPERATORS, _SPACES, _SYMBOLS
@@ -261,6 +261,14 @@ def notebook_of(*sources):
 def test_failing_cell_stops_the_report_by_name(tmp_path):
     with pytest.raises(TankcalError, match=r"cell 2 \(1 / 0\): ZeroDivisionError"):
         execute(notebook_of("x = 1", "1 / 0"), tmp_path)
+
+
+@pytest.mark.parametrize(("source", "kind"), [("None + 1", CellError), ("1 / 0", TankcalError)])
+def test_what_stopped_a_cell(source, kind, tmp_path):
+    """Values of another kind than a record has, or anything else."""
+    with pytest.raises(TankcalError) as told:
+        execute(notebook_of(source), tmp_path)
+    assert type(told.value) is kind
 
 
 def test_cells_take_what_is_handed_to_them(tmp_path):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tankcal import record as records
 from tankcal import report
-from tankcal.errors import InputError, Problem, TankcalError, VocabularyError
+from tankcal.errors import CellError, InputError, Problem, TankcalError, VocabularyError
 from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.messages import message
 from tankcal.record import long_tables
@@ -115,7 +115,7 @@ def rebuild(record_path, directory, progress=None, language=None, letterhead=Non
 
     try:
         return _write(prepare, directory, progress, language, letterhead)
-    except VocabularyError as error:
+    except (VocabularyError, CellError) as error:
         found = message("record_speaks_otherwise", "does not have the content of a record "
                                                    "({what})",
                         what=str(error))  # fmt: skip
