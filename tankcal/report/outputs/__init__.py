@@ -12,7 +12,7 @@ from tankcal.errors import CellError, InputError, Problem, TankcalError, Vocabul
 from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.messages import message
 from tankcal.record import long_tables
-from tankcal.record.plain_data import without_collection
+from tankcal.record.plain_data import without_collection, without_looking_back
 from tankcal.report import dcc, folders, manifest
 from tankcal.report.attachments import sha256
 from tankcal.report.outputs import tables
@@ -160,7 +160,8 @@ def _write(prepare, directory, progress, language=None, letterhead=None, papers=
             record = prepare(temporary)
             tables.write_tables(record, temporary)
         if papers:
-            _write_papers(record, temporary, progress, language, letterhead)
+            with without_looking_back():
+                _write_papers(record, temporary, progress, language, letterhead)
     return [Path(directory) / name for name in FILES if (Path(directory) / name).exists()]
 
 
