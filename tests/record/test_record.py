@@ -137,7 +137,7 @@ def test_unused_numbers_are_null(record):
 @pytest.mark.parametrize("rows", [0, 1, 999, 1000, 1001, 2500])
 def test_a_record_is_written_in_pieces_of_the_same_json(rows, tmp_path):
     """Second method: all of it at once."""
-    row = {"name": "\u00e9 \"", "values": [1.5, None, True], "none": {}}
+    row = {"name": '\u00e9 "', "values": [1.5, None, True], "none": {}}
     record = {"table": {"rows": [row] * rows, "height_m": [0.1] * rows}, "empty": {}, "n": None}
     save(record, tmp_path / "record.json")
     whole = json.dumps(record, ensure_ascii=False, separators=(",", ":"))

@@ -13,6 +13,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_outp
 
 from tankcal.errors import CellError, TankcalError
 from tankcal.report import FILES, blocks, build
+from tankcal.report import pdf as pdf_of
 from tankcal.report.document import PARTS, blocks_of, last_cell
 from tankcal.report.latex_math import _FUNCTIONS, _GREEK, _OPERATORS, _SPACES, _SYMBOLS
 from tankcal.report.notebook import execute, joined, written
@@ -401,3 +402,15 @@ def test_templates_have_no_outputs_and_one_parameters_cell():
         "RECORD = 'record.json'\nLANGUAGE = None\nLETTERHEAD = None"
     )
     assert sum("setup" in cell["metadata"]["tags"] for cell in notebook["cells"]) == 1
+
+
+@pytest.mark.parametrize(("rows", "again", "forgets"), [(4, False, 1), (4, True, 0), (3, False, 0)])
+def test_what_is_kept_of_a_long_table_is_forgotten(rows, again, forgets, monkeypatch):
+    """Unless a later document has it again."""
+    done = []
+    monkeypatch.setattr(pdf_of, "LONG", 3)
+    monkeypatch.setattr(pdf_of, "_compile", lambda files, timestamp: b"%PDF")
+    monkeypatch.setattr(pdf_of, "_forget", lambda: done.append("forgot"))
+    table = blocks.table(["a"], [["1"]] * rows).data
+    assert pdf_of.pdf([blocks.document(title="t").data, table], again=again) == b"%PDF"
+    assert len(done) == forgets
