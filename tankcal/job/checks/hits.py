@@ -6,6 +6,7 @@ from tankcal.job.checking import has_rows, refuse_repeated
 from tankcal.job.checks.extent import has_hits, has_survey, tells_by_tape
 from tankcal.job.checks.strapping import refuse_others, tapes_of
 from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
+from tankcal.job.checks.survey.instruments import check_correction
 from tankcal.job.checks.survey.readings import check_angle
 from tankcal.job.contract.registers import FREE
 from tankcal.messages import message
@@ -127,6 +128,8 @@ def _check_instruments(files, hits):
             places.setdefault(used[name], []).append(place)
     for name, mine in places.items():
         _check_instrument(files, hits, name, ranging[name], np.array(mine))
+        if not has_survey(tables):  # else all instruments are asked
+            check_correction(files, name, ranging[name])
 
 
 def _check_instrument(files, hits, name, given, mine):

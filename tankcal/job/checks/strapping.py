@@ -18,6 +18,7 @@ from tankcal.job.tables import nearest
 from tankcal.messages import message
 
 MOST_STRAPS = 1000  # readings round one tank
+THICK_WELD_MM = 5.0
 END_M = 0.02  # so far beyond its course a level may stand
 
 
@@ -276,6 +277,7 @@ def _check_obstructions(table, names, log):
                     of_kind=kind,
                 )
                 log.problem(table.file, expected, row, column)
+        _check_sizes(table, place, log)
         over, arc = table.of("over_mm")[place], table.of("arc_mm")[place]
         if kind == "step_over" and None not in (over, arc) and over < arc:
             expected = message(
@@ -286,6 +288,31 @@ def _check_obstructions(table, names, log):
                 arc=arc,
             )
             log.problem(table.file, expected, row, "over_mm")
+
+
+def _check_sizes(table, place, log):
+    """Warn of a strip that stands higher than it is wide, and of a weld that no welder leaves."""
+    kind, row = table.of("kind")[place], table.rows[place]
+    high, wide = table.of("thickness_mm")[place], table.of("width_mm")[place]
+    if kind not in ("weld", "butt_strap") or None in (high, wide):
+        return
+    if high > wide:
+        expected = message(
+            "strip_upright",
+            "{high:g} mm thick and {wide:g} mm wide: are the two columns exchanged?",
+            high=high,
+            wide=wide,
+        )
+        log.warning(table.file, expected, row, "thickness_mm")
+    elif kind == "weld" and high > THICK_WELD_MM:
+        expected = message(
+            "weld_thick",
+            "found {high:g} mm; the cap of a weld stands off by {most:g} mm at most: is it that of"
+            " the plate?",
+            high=high,
+            most=THICK_WELD_MM,
+        )
+        log.warning(table.file, expected, row, "thickness_mm")
 
 
 def _check_comparisons(table, tapes, raw, log):
