@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tankcal.errors import SHEET, sheet_named
 from tankcal.job.fields import is_blank
 from tankcal.messages import message
 
@@ -52,6 +53,22 @@ def name_twice(name, first_row):
         name=name,
         first_row=first_row,
     )
+
+
+def tell_missing(log, file, table, column):
+    """One problem for a table or a register that is not there, however many columns refer to it.
+
+    table, column  of one of those that do
+    """
+    if log.has(file, None, None):
+        return
+    expected = message(
+        "register_missing",
+        "missing or empty; expected it: the column {column} of {table} refers to its entries",
+        column=column,
+        table=sheet_named(table.removeprefix(SHEET)) if table.startswith(SHEET) else table,
+    )
+    log.problem(file, expected)
 
 
 def course_heights(courses):
