@@ -21,7 +21,7 @@ FILE = "circumferences.csv"
 NOMINAL_SHARE = 1 / 500  # of the radius: a course that departs by more from the nominal one
 FLUSH, LEAST_STEP_M = 0.5, 1e-3  # of a step of plates that the outside shows; that shows it
 SHORT_BY_PLATES = 0.5, 1.5  # of a plate: so short of the nominal radius
-FAR_REPEATS = 3  # limits of repeats by which a course is far from all others, at least
+FAR_REPEATS = 5  # limits of repeats by which a course is far from all others, at least
 FARTHEST_M = 1.0  # sd of a departure that something controls
 APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826  # of differences within a course
 

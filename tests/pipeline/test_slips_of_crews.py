@@ -9,6 +9,7 @@ import pytest
 from crews import BOOKS, CrewTank
 from job_builder import strapped_parts, write_folder
 from messages_told import lines
+from scipy.stats import binom
 
 import tankcal
 from tankcal.pipeline.compared_courses import BY_CHANCE, course_apart
@@ -100,7 +101,7 @@ def test_a_slip_is_told(tmp_path, kind, slip, code):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", BOOKS)
 def test_sound_books_are_quiet_and_within_u(tmp_path, kind, figure):
-    """Simulation: 30 sound crews by each method."""
+    """Simulation: of 30 sound crews no more are out of U than 95 % intervals leave in 99 of 100."""
     ratios, told = [], []
     for seed in range(SOUND):
         book = book_of(kind, 2000 + seed)
@@ -110,7 +111,7 @@ def test_sound_books_are_quiet_and_within_u(tmp_path, kind, figure):
         told += OF_SLIPS & set(found)
     figure(f"{kind}: rms of error over U of sound crews", np.sqrt(np.mean(np.square(ratios))))
     assert not told
-    assert np.sum(np.abs(ratios) > 1) <= 2
+    assert np.sum(np.abs(ratios) > 1) <= binom.isf(0.01, SOUND, 0.05)
 
 
 def test_sound_courses_seldom_stand_apart():
