@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from tankcal.errors import SHEET, sheet_named
 from tankcal.job.fields import is_blank
 from tankcal.messages import message
 
@@ -66,7 +65,7 @@ def tell_missing(log, file, table, column):
         "register_missing",
         "missing or empty; expected it: the column {column} of {table} refers to its entries",
         column=column,
-        table=sheet_named(table.removeprefix(SHEET)) if table.startswith(SHEET) else table,
+        table=table,
     )
     log.problem(file, expected)
 

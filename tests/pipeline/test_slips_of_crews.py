@@ -7,12 +7,13 @@ hand, and moved the table by more than U without a word before its check was mad
 import numpy as np
 import pytest
 from crews import BOOKS, CrewTank
-from job_builder import strapped_parts, write_folder
+from job_builder import strapped_parts, write_book, write_folder
 from messages_told import lines
 from scipy.stats import binom
 
 import tankcal
 from tankcal.pipeline.compared_courses import BY_CHANCE, course_apart
+from tankcal.record import record_of
 
 OF_SLIPS = {
     "strap_contradicts", "strapped_course_apart", "lines_turned_about", "hits_ranged_otherwise",
@@ -112,6 +113,24 @@ def test_sound_books_are_quiet_and_within_u(tmp_path, kind, figure):
     figure(f"{kind}: rms of error over U of sound crews", np.sqrt(np.mean(np.square(ratios))))
     assert not told
     assert np.sum(np.abs(ratios) > 1) <= binom.isf(0.01, SOUND, 0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", BOOKS)
+def test_a_workbook_in_portuguese_is_the_same_job(tmp_path, kind):
+    """Property: a crew that writes "trena" and "esquerda" on its sheets gets the same record."""
+    words = {"tape": "Trena", "total_station": "estação total", "left": "esquerda",
+             "right": "direita", "outside": "fora", "inside": "dentro"}  # fmt: skip
+    book = book_of(kind, 1003)
+    result, _ = computed(tmp_path / "folder", book)
+    for row in (*book.tables.get("tangents", ()), *book.tables.get("lines", ())):
+        row["side"] = words[row["side"]]
+    for one in book.instruments.values():
+        one["kind"] = words[one["kind"]]
+    book.settings["survey.side"] = words[book.settings["survey.side"]]
+    said = tankcal.run(tankcal.load(write_book(tmp_path / "book.xlsx", book.parts())))
+    assert np.array_equal(said.table.volume_m3, result.table.volume_m3)
+    assert record_of(said).keys() == record_of(result).keys()
 
 
 def test_sound_courses_seldom_stand_apart():
