@@ -9,6 +9,7 @@ from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import noise_of_wall
 from tankcal.pipeline.level_checks import (
     check_nominal,
+    check_size_told,
     courses_with_few,
     girth_m,
     levels_with_few,
@@ -49,6 +50,7 @@ def check_hits(job, wall, sighting):
         *_of_incidence(sighting),
         *_of_setups(job, wall, sighting),
         *check_nominal(job, wall, job.hits.file),
+        *(() if wall.by_inputs else check_size_told(job, [*job.hits.instruments])),
         *causes_unlike_certificates(wall, sighting.told, taken_off_m=sighting.told_m),
     )
 

@@ -11,6 +11,7 @@ from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import noise_of_wall
 from tankcal.pipeline.level_checks import (
     check_nominal,
+    check_size_told,
     courses_with_few,
     girth_m,
     levels_with_few,
@@ -104,7 +105,16 @@ def check_tangents(job, wall, touching):
         *_of_heights(job, touching),
         *_of_setups(job, tests),
         *check_nominal(job, wall, job.tangents.file),
+        *_of_scale(job),
     )
+
+
+def _of_scale(job):
+    """A traverse whose distances one instrument measured, without a tape or a bar."""
+    read = () if job.measurements is None else job.measurements.readings
+    names = {one.instrument for one in job.tangents.setups.values()}
+    is_alone = len(names) == 1 and "distances" not in {table.table for table in read}
+    return check_size_told(job, [*names]) if is_alone else ()
 
 
 def _of_levels(job, wall):

@@ -100,6 +100,23 @@ def test_a_slip_is_told(tmp_path, kind, slip, code):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "table"), [("tangents", "slope_distances"), ("three set-ups", "wall_hits")]
+)
+def test_a_constant_in_all_distances_is_told_by_the_drawing(tmp_path, kind, table):
+    """Nothing in the readings shows it, so the drawing is asked for."""
+    book = book_of(kind, 1002)
+    for row in book.tables[table]:
+        row["distance_m"] += 0.0344
+    _, told = computed(tmp_path / "asked", book)
+    assert "checks.diameter_is" in told["size_told_by_distances"]
+    book.settings["checks.diameter_is"] = "inside"
+    _, told = computed(tmp_path / "drawn", book)
+    assert "inside_unlike_drawing" in told
+    assert "size_told_by_distances" not in told
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", BOOKS)
 def test_sound_books_are_quiet_and_within_u(tmp_path, kind, figure):
     """Simulation: of 30 sound crews no more are out of U than 95 % intervals leave in 99 of 100."""
