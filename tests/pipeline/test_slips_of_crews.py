@@ -12,6 +12,7 @@ from messages_told import lines
 from scipy.stats import binom
 
 import tankcal
+from tankcal.errors import InputError
 from tankcal.pipeline.compared_courses import BY_CHANCE, course_apart
 from tankcal.record import record_of
 
@@ -97,6 +98,18 @@ def test_a_slip_is_told(tmp_path, kind, slip, code):
     slip(book)
     _, told = computed(tmp_path / "slipped", book)
     assert code in told
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["hits", "three set-ups"])
+def test_horizontal_distances_are_told(tmp_path, kind):
+    book = book_of(kind, 1002)
+    for row in book.tables["wall_hits"]:
+        row["distance_m"] *= np.sin(np.radians(row["zenith_deg"]))
+    with pytest.raises(InputError) as told:
+        computed(tmp_path, book)
+    assert {one.expected.code for one in told.value.problems} == {"hits_horizontal"}
+    assert {one.column for one in told.value.problems} == {"distance_m"}
 
 
 @pytest.mark.slow
