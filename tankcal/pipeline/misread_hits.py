@@ -16,6 +16,7 @@ from tankcal.survey.untied import sees_all_around
 GON_IN_DEG, DEG_IN_GON = 0.9, 1 / 0.9  # what turns a value that is read so into what was meant
 CLOSER = 0.2  # scatter about a circle, of that as it is read, from which on another unit is told
 LEAST_M, FEWEST = 0.01, 12  # scatter that no unit explains; hits of a set-up
+LEAST_SINE = 1e-3  # of zenith angles: a sight straight up has no horizontal distance
 
 
 def refuse_other_units(hits):
@@ -54,7 +55,7 @@ def _scatter(hits, mine, of_direction, of_zenith, *, are_horizontal=False):
     ray = rays(of_direction * hits.direction_rad[mine], of_zenith * hits.zenith_rad[mine])[0]
     places = hits.distance_m[mine, None] * ray
     if are_horizontal:
-        places /= np.sin(hits.zenith_rad[mine, None])
+        places /= np.maximum(np.sin(hits.zenith_rad[mine, None]), LEAST_SINE)
     if not sees_all_around(places) or np.ptp(places[:, :2], axis=0).min() == 0:
         return np.inf
     local = places[:, :2] - places[:, :2].mean(axis=0)
