@@ -11,15 +11,14 @@ from tankcal.job.checking import (
     temperature_missing,
 )
 from tankcal.job.checks.extent import has_radii, has_wall_points, is_strapped
+from tankcal.job.checks.obstructions import check_obstructions
 from tankcal.job.checks.spans import check_spans
 from tankcal.job.contract.observations import READINGS
 from tankcal.job.contract.registers import FREE
-from tankcal.job.contract.strapping import NEEDED
 from tankcal.job.tables import nearest
 from tankcal.messages import message
 
 MOST_STRAPS = 1000  # readings round one tank
-THICK_WELD_MM = 5.0
 END_M = 0.02  # so far beyond its course a level may stand
 
 
@@ -63,8 +62,10 @@ def check_readings(straps, tables, registers, raw, log):
     tapes = tapes_of(registers)
     _check_tapes(straps, registers["instruments"], tapes, raw, log)
     _check_pulls(straps, log)
-    _check_obstructions(tables["obstructions"], set(straps.of("circumference")), log)
     if has_rows(tables["obstructions"]):
+        names = set(straps.of("circumference"))
+        refuse_others(tables["obstructions"], "circumference", names, log)
+        check_obstructions(tables["obstructions"], log)
         check_spans(tables["obstructions"], straps, tapes_read(straps, tapes), tapes, raw, log)
     _check_comparisons(tables["tape_checks"], tapes, raw, log)
 
@@ -279,58 +280,6 @@ def _missing_of_certificate(given, certificate):
                 "missing, but section_mm2 is given; expected the tension of the certificate",
             ),
         )
-
-
-def _check_obstructions(table, names, log):
-    """Obstructions on circumferences of these names, with the lengths of their kinds."""
-    if not has_rows(table):
-        return
-    refuse_others(table, "circumference", names, log)
-    for place, (row, kind) in enumerate(zip(table.rows, table.of("kind"), strict=True)):
-        for column in NEEDED.get(kind, ()):
-            if table.of(column)[place] is None and not log.has(table.file, row, column):
-                expected = message(
-                    "obstruction_incomplete",
-                    "blank; expected it of an obstruction of kind {of_kind}",
-                    of_kind=kind,
-                )
-                log.problem(table.file, expected, row, column)
-        _check_sizes(table, place, log)
-        over, arc = table.of("over_mm")[place], table.of("arc_mm")[place]
-        if kind == "step_over" and None not in (over, arc) and over < arc:
-            expected = message(
-                "step_over_too_short",
-                "found {over:g}; expected at least the arc of the shell, {arc:g}: over an"
-                " obstruction the way is longer",
-                over=over,
-                arc=arc,
-            )
-            log.problem(table.file, expected, row, "over_mm")
-
-
-def _check_sizes(table, place, log):
-    """Warn of a strip that stands higher than it is wide, and of a weld that no welder leaves."""
-    kind, row = table.of("kind")[place], table.rows[place]
-    high, wide = table.of("thickness_mm")[place], table.of("width_mm")[place]
-    if kind not in ("weld", "butt_strap") or None in (high, wide):
-        return
-    if high > wide:
-        expected = message(
-            "strip_upright",
-            "{high:g} mm thick and {wide:g} mm wide: are the two columns exchanged?",
-            high=high,
-            wide=wide,
-        )
-        log.warning(table.file, expected, row, "thickness_mm")
-    elif kind == "weld" and high > THICK_WELD_MM:
-        expected = message(
-            "weld_thick",
-            "found {high:g} mm; the cap of a weld stands off by {most:g} mm at most: is it that of"
-            " the plate?",
-            high=high,
-            most=THICK_WELD_MM,
-        )
-        log.warning(table.file, expected, row, "thickness_mm")
 
 
 def _check_comparisons(table, tapes, raw, log):
