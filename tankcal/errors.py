@@ -150,6 +150,10 @@ class VocabularyError(TankcalError):
     """A code or a unit that no language has words for; in a record that was read, damage."""
 
 
+class CellError(TankcalError):
+    """A cell of the report met what it cannot work with; in a record that was read, damage."""
+
+
 class ProgramError(TankcalError):
     """A result that contradicts itself, such as an interval that leaves its volume out.
 

@@ -132,6 +132,7 @@ def _read_tables(raw, registers, is_whole, log):
     if kind in OF_CLOUDS:
         allowed += CLOUD_TABLES
     tables = {"clouds": _cloud_table(raw, registers, kind, log)}
+    looks = kind or ("horizontal" if raw.tables.get("rings") is not None else None)
     for name in TABLES:
         table = raw.tables.get(name)
         is_empty = table is None or not (table.rows or table.skipped)
@@ -143,7 +144,7 @@ def _read_tables(raw, registers, is_whole, log):
         if table is None or (is_empty and name not in TANK_TABLES):
             tables[name] = None
         else:
-            tables[name] = _as_upright(read_columns(name, table, log, kind=kind))
+            tables[name] = _as_upright(read_columns(name, table, log, kind=looks))
     if is_whole:
         _tell_missing_tables(raw, tables, kind, log)
     return tables
@@ -183,7 +184,7 @@ def _tell_missing_tables(raw, tables, kind, log):
     for name in REQUIRED_TABLES.get(kind, ()):
         measured = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
         told = measured or is_metered(tables) or has_radii(tables)
-        elsewhere = name == "points" and told
+        elsewhere = name == "points" and (told or has_lines(tables))
         if name in raw.tables or elsewhere:
             continue
         if name == "points" and "clouds" in raw.registers:
@@ -198,14 +199,22 @@ def _tell_missing_tables(raw, tables, kind, log):
 
 
 def _tell_sights_missing(raw, tables, log):
-    """Set-ups that name no target, beside an empty table of what was sighted from them."""
+    """Set-ups that name no target, beside an empty table of what was sighted from them, or none."""
     elsewhere = has_rows(tables["points"]) or has_rows(tables["targets"]) or is_sighted(tables)
     measured = has_survey(tables) or is_strapped(tables)  # without, the points are missing
     if elsewhere or not measured or not has_rows(tables["setups"]):
         return
-    for name in ("wall_hits", "tangents"):
-        if raw.tables.get(name) is not None:
+    sights = [name for name in ("wall_hits", "tangents") if name in raw.tables]
+    for name in sights:
+        if raw.tables[name] is not None:
             log.problem(raw.tables[name].file, _IN_PLACE_OF_POINTS[name])
+    if not sights and not has_survey(tables):
+        expected = message(
+            "setups_without_sights",
+            "set-ups, but nothing was sighted from them; expected wall_hits.csv, tangents.csv, or"
+            " readings such as directions.csv",
+        )
+        log.problem(tables["setups"].file, expected)
 
 
 def _tell_clouds_missing(raw, tables, log):

@@ -54,6 +54,22 @@ def name_twice(name, first_row):
     )
 
 
+def tell_missing(log, file, table, column):
+    """One problem for a table or a register that is not there, however many columns refer to it.
+
+    table, column  of one of those that do
+    """
+    if log.has(file, None, None):
+        return
+    expected = message(
+        "register_missing",
+        "missing or empty; expected it: the column {column} of {table} refers to its entries",
+        column=column,
+        table=table,
+    )
+    log.problem(file, expected)
+
+
 def course_heights(courses):
     """Heights of all courses, m; None where one is missing, bad or unreadable."""
     if courses is None or courses.skipped:

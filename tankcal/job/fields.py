@@ -65,7 +65,8 @@ class Field:
     kinds      the kinds of tank that it is for; (): all
     required_for  kinds of tank for which it is required though `required` is not set
     low, high  bounds of a number, both allowed unless `above_low`: then low itself is not
-    choices    what a choice may be; of a number, words that may stand in its place
+    choices    what a choice may be; of a number, words that may stand in its place; of a text, what
+               it mostly is
     in_full    an optional column that is filled in for every row, or for none
     start      what the starter job has there
     of_survey  of use only where observations are adjusted
@@ -379,7 +380,7 @@ def _read_text(field, raw, _decimal):
         sound = len(text) <= MAX_NAME and pattern.fullmatch(text) is not None
     if not sound:
         raise _refused(field, shown(text))
-    return text
+    return meant(text, field.choices) or text
 
 
 def _is_writing(char):

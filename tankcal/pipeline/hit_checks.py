@@ -9,11 +9,17 @@ from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import noise_of_wall
 from tankcal.pipeline.level_checks import (
     check_nominal,
+    check_size_told,
     courses_with_few,
     girth_m,
     levels_with_few,
 )
-from tankcal.pipeline.moved_setups import moved_setups, worst_setup
+from tankcal.pipeline.moved_setups import (
+    critical_of_ranging,
+    moved_setups,
+    ranged_otherwise,
+    worst_setup,
+)
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.wall import joints_of
 from tankcal.survey.control_drift import repeats_of
@@ -24,6 +30,7 @@ UNLIKE_SDS = 3.0  # of an offset or a scale from its certificate, of an angle fr
 OVER_JOINT_M = 0.02  # a hit of a course may lie so far beyond it
 SUSPECT = 3.0  # test quantity of the worst set-up, from which it is tested by all others
 WAVE_M = 3e-3  # sd of each long wave of a wall, when a set-up is tested
+MOSTLY = 0.9  # of the test quantity of a move: distances explain the set-up as well
 MOVED_M = 4e-3  # of its hits or its station: less looks like the form of the wall
 SHOWN = 5
 GON = FULL_TURN / 400
@@ -43,6 +50,7 @@ def check_hits(job, wall, sighting):
         *_of_incidence(sighting),
         *_of_setups(job, wall, sighting),
         *check_nominal(job, wall, job.hits.file),
+        *(() if wall.by_inputs else check_size_told(job, [*job.hits.instruments])),
         *causes_unlike_certificates(wall, sighting.told, taken_off_m=sighting.told_m),
     )
 
@@ -161,7 +169,8 @@ def _of_incidence(sighting):
 
 
 def _of_setups(job, wall, sighting):
-    """The set-up of a network whose hits contradict those of all others most, where one does.
+    """The set-up of a network that ranged otherwise than all others, or whose hits contradict
+    those of all others most, where one does.
 
     Where the wall alone ties set-ups nothing tells that one moved.
     """
@@ -177,15 +186,31 @@ def _of_setups(job, wall, sighting):
         return
     whole = wall.field.covariance_m2 + noise_of_wall(wall) - wall.field.noise_m2
     counted = np.flatnonzero(~job.hits.check)[at]
-    away = (sighting.points.xyz_m - sighting.poses.xyz_m[sighting.pose])[counted, :2]
-    normal = sighting.normal[counted, :2]
+    sight = (sighting.points.xyz_m - sighting.poses.xyz_m[sighting.pose])[counted]
+    away, normal = sight[:, :2], sighting.normal[counted]
     turn = normal[:, 0] * away[:, 1] - normal[:, 1] * away[:, 0]
-    columns = np.column_stack([turn, normal])
-    tests = moved_setups(wall.field, whole, names[at], columns, SUSPECT, wave_m=WAVE_M)
-    worst = worst_setup(tests)
+    along = np.sum(normal * sight, axis=1) / np.linalg.norm(sight, axis=1)
+    given = wall.field, whole, names[at]
+    ranged = ranged_otherwise(*given, along, SUSPECT, wave_m=WAVE_M)
+    moved = moved_setups(*given, np.column_stack([turn, normal[:, :2]]), SUSPECT, wave_m=WAVE_M)
+    setup = max(ranged, key=lambda one: ranged[one][0])
+    (w, longer), most = ranged[setup], max(one[0] for one in moved.values())
+    if w > max(critical_of_ranging(len(ranged)), MOSTLY * most) and abs(longer) > MOVED_M:
+        text = message(
+            "hits_ranged_otherwise",
+            "the distances from set-up {setup!r} contradict all others (w = {w:.1f}), as if they"
+            " were {longer_mm:+.1f} mm too long: was the constant of a reflector set, or another"
+            " instrument or mode used?",
+            setup=setup,
+            w=w,
+            longer_mm=1000 * longer,
+        )
+        yield Problem("setups.csv", text, job.hits.setups[setup].row, "instrument")
+        return
+    worst = worst_setup(moved)
     if worst is None:
         return
-    _, turned, shift = tests[worst["setup"]]
+    _, turned, shift = moved[worst["setup"]]
     moved_m = max(float(np.hypot(*shift)), abs(turned) * float(np.median(np.hypot(*away.T))))
     if moved_m > MOVED_M:
         text = message(

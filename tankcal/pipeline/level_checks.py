@@ -58,3 +58,23 @@ def check_nominal(job, wall, file):
             miss_mm=1000 * miss,
         )
         yield Problem(file, text)
+
+
+def check_size_told(job, instruments):
+    """`Problem`s of a wall whose size the distances of instruments alone tell.
+
+    A constant or a scale that is wrong in all of them goes into every radius, and nothing else in
+    the readings shows it: up to 1 in 500 of the nominal radius passes, many times U.
+
+    instruments  their names
+    """
+    if job.strapping is not None or job.circumference_m is not None or job.diameter_is is not None:
+        return
+    text = message(
+        "size_told_by_distances",
+        "blank, and nothing but the distances of {instruments} tells how large the tank is: the"
+        " constant of a prism or a wrong scale would not show; say what the nominal diameter is on"
+        " the drawing, or strap a course",
+        instruments=list_some(instruments, SHOWN),
+    )
+    yield Problem("job.toml", text, column="checks.diameter_is")

@@ -324,9 +324,10 @@ def _of_straps(job, wall, levels):
         if strap.course in risen:
             nearest = min(risen[strap.course], key=lambda one: abs(one[0] - strap.level_m))
             zeros.setdefault(strap.course, []).append((reading.radius_m - nearest[1], strap))
-    if reference.course not in zeros:
+    if not zeros:
         return
-    own = sorted(zeros.pop(reference.course), key=lambda one: one[0])
+    course = reference.course if reference.course in zeros else next(iter(zeros))
+    own = sorted(zeros.pop(course), key=lambda one: one[0])
     apart, (first, second) = own[-1][0] - own[0][0], (own[0][1], own[-1][1])
     if apart > OFF_LEVEL_M and first.name != second.name:  # of repeats another check tells
         text = message(
@@ -336,7 +337,7 @@ def _of_straps(job, wall, levels):
             " or over an obstruction?",
             first=first.name,
             second=second.name,
-            course=reference.course,
+            course=course,
             apart_mm=1000 * apart,
         )
         yield Problem("circumferences.csv", text, row=second.row, column="reading_m")
@@ -350,7 +351,7 @@ def _of_straps(job, wall, levels):
                 " lines the other one?",
                 name=strap.name,
                 away_mm=1000 * (radius - zero),
-                course=reference.course,
+                course=course,
             )
             yield Problem("circumferences.csv", text, row=strap.row, column="reading_m")
     if not zeros:

@@ -111,7 +111,8 @@ def check_sign(job, levels):
             "lines_turned_about",
             "where the plates are thicker the wall comes out further in ({slope:+.1f} of their"
             " step, sd {sd:.1f}): was the scale read from its other end, is the sign of the offsets"
-            " or the side of the lines the other one, or are the plates flush outside?",
+            " or the side of the lines the other one, are the levels those from the top down, or"
+            " are the plates flush outside?",
             slope=slope,
             sd=sd,
         )

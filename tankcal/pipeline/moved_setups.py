@@ -12,6 +12,7 @@ shells and foundations have are all but free, whatever the spectrum of the field
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.special import chdtri
@@ -21,6 +22,7 @@ from tankcal.geometry.field.blunders import restricted_precision
 from tankcal.geometry.field.sites import free_design
 
 ALPHA = 0.001  # of the test of a set-up, over the number of set-ups
+ALPHA_RANGED = 0.01  # the same of its distances, in which slips are more common
 WAVES = np.arange(2, 9)  # round a wall, of every course alike
 
 
@@ -47,18 +49,40 @@ def moved_setups(field, whole, names, columns, suspect_from, *, wave_m=0.0):
     dict
         {set-up: (w, its turn alone rad, its shift alone (2,) m)}.
     """
-    count, whole = len(names), whole + _waves(field.sites, wave_m)
+    whole = whole + _waves(field.sites, wave_m)
+    return _by_setup(field, whole, names, suspect_from, partial(_as_if_moved, columns))
+
+
+def ranged_otherwise(field, whole, names, along, suspect_from, *, wave_m=0.0):
+    """How much each set-up looks as if all its distances were too long, or too short.
+
+    Parameters
+    ----------
+    field, whole, names, suspect_from, wave_m
+        As of `moved_setups`.
+    along : ndarray, shape (k,)
+        Derivative of the readings by an offset of the distances of their set-up.
+
+    Returns
+    -------
+    dict
+        {set-up: (w, by how much too long m)}.
+    """
+    whole = whole + _waves(field.sites, wave_m)
+    return _by_setup(field, whole, names, suspect_from, partial(_as_if_longer, along))
+
+
+def _by_setup(field, whole, names, suspect_from, test):
+    """{set-up: test(which readings are its own, P, P y)}; the worst one by all others alone."""
+    count = len(names)
     precision, pull = tested(field, whole, count)
-    found = {
-        name: _as_if_moved(columns, names == name, precision, pull)
-        for name in dict.fromkeys(names.tolist())
-    }
+    found = {name: test(names == name, precision, pull) for name in dict.fromkeys(names.tolist())}
     suspect = max(found, key=lambda one: found[one][0])
     if found[suspect][0] > suspect_from:
         mine = names == suspect
         other = _without(field, whole - field.covariance_m2, mine)
         if other is not None:
-            found[suspect] = _as_if_moved(columns, mine, *tested(field, other, count))
+            found[suspect] = test(mine, *tested(field, other, count))
     return found
 
 
@@ -110,6 +134,14 @@ def _as_if_moved(columns, mine, precision, pull):
     return np.sqrt(max(statistic, 0.0)), float(turn), tuple(shift.tolist())
 
 
+def _as_if_longer(along, mine, precision, pull):
+    """(w, by how much too long) of a set-up whose readings are mine."""
+    column = along * mine
+    weight = max(column @ precision @ column, 1e-300)
+    value = float(column @ pull) / weight
+    return float(abs(value) * np.sqrt(weight)), value
+
+
 def worst_setup(tests):
     """What `moved_setups` found of the set-up that looks most as if it had moved.
 
@@ -133,3 +165,8 @@ def worst_setup(tests):
 def critical_of_setup(count):
     """Test quantity from which one of so many set-ups counts as disturbed."""
     return float(np.sqrt(chdtri(3, ALPHA / max(count, 1))))
+
+
+def critical_of_ranging(count):
+    """Test quantity from which one of so many set-ups counts as one that ranged otherwise."""
+    return float(np.sqrt(chdtri(1, ALPHA_RANGED / max(count, 1))))

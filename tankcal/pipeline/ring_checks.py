@@ -8,12 +8,12 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
+from tankcal.pipeline.compared_courses import exchanged_courses
 from tankcal.pipeline.cross_checks import check_side
 from tankcal.pipeline.strapping_checks import (
     FILE,
     NOMINAL_SHARE,
     check_repeats,
-    exchanged_courses,
     read_once,
     straps_apart,
 )

@@ -4,13 +4,14 @@ Causes are named where one fits: courses exchanged, a reading of the inside, a s
 itself. What the tapes and their readings say of themselves: `tape_checks`.
 """
 
-from itertools import combinations
-
 import numpy as np
 
 from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
+from tankcal.geometry.field.blunders import restricted_precision
+from tankcal.geometry.field.sites import free_design
 from tankcal.messages import message
+from tankcal.pipeline.compared_courses import course_apart, exchanged_courses
 from tankcal.pipeline.cross_checks import check_side
 from tankcal.pipeline.survey_limits import limit_at
 from tankcal.pipeline.tape_checks import check_tapes
@@ -20,9 +21,8 @@ FILE = "circumferences.csv"
 NOMINAL_SHARE = 1 / 500  # of the radius: a course that departs by more from the nominal one
 FLUSH, LEAST_STEP_M = 0.5, 1e-3  # of a step of plates that the outside shows; that shows it
 SHORT_BY_PLATES = 0.5, 1.5  # of a plate: so short of the nominal radius
-EXCHANGED_SHARE, EXCHANGED_M = 0.4, 1.5e-3  # of the steps between courses: left, and saved
-BY_CHANCE = 0.05  # of sound courses that scatter as much so many look so much better, at most
-DRAWS = 1000  # of sound shells
+FAR_REPEATS = 5  # limits of repeats by which a course is far from all others, at least
+FARTHEST_M = 1.0  # sd of a departure that something controls
 APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826  # of differences within a course
 
 
@@ -47,21 +47,66 @@ def check_strapped(job, wall):
     )
 
 
-def check_straps_beside_points(job, straps):
-    """`Problem`s of straps round a wall that points show."""
+def check_straps_beside_points(job, wall):
+    """`Problem`s of straps round a `Wall` that points show."""
+    straps = wall.straps
     return (
         *check_tapes(job, straps),
         *check_repeats(straps),
-        *_of_contradicted(straps),
+        *_of_contradicted(straps, strapped_together(wall)),
     )
 
 
-def _of_contradicted(straps):
-    """Straps that depart from what the points and all other straps show."""
+def strapped_together(wall):
+    """Circumferences of a `Wall` whose repeats all depart from its points and all other straps.
+
+    Repeats vouch for each other, so that no single one of them departs. With P the precision of the
+    readings y without what is free, and a that is 1 for those of one circumference, they are by
+    a' P y / a' P a of radius off what the others show, sqrt(a' P a) times that of its standard
+    deviations (Cook & Weisberg 1982).
+
+    Returns
+    -------
+    dict
+        {place among the readings of the file of the first of them: (w, departure_m)}.
+    """
+    straps, names = wall.straps, {}
+    kept = straps.adjusted[straps.accepted]
+    for at, place in enumerate(kept, len(wall.field.radius_m) - len(wall.readings)):
+        names.setdefault(straps.reduced[place].strap.name, []).append((at, place))
+    repeated = [each for each in names.values() if len(each) > 1]
+    if not repeated:
+        return {}
+    precision = restricted_precision(wall.field.covariance_m2, free_design(wall.field.sites)[0])
+    pull = precision @ (wall.field.radius_m - wall.field.radius_m.mean())
+    found = {}
+    for each in repeated:
+        at = [one for one, _ in each]
+        weight = precision[np.ix_(at, at)].sum()
+        if weight > 1 / FARTHEST_M**2:  # else no other controls them
+            departure = pull[at].sum() / weight
+            found[each[0][1]] = float(departure * np.sqrt(weight)), float(departure)
+    return found
+
+
+def _of_contradicted(straps, together):
+    """Straps that depart from what the points and all other straps show.
+
+    together  as `strapped_together` found them
+    """
+    apart = {}
+    for place, (w, departure) in together.items():
+        one = straps.reduced[place]
+        miss = abs(departure) * straps.per_radius
+        if abs(w) > CRITICAL and miss > limit_of_repeats(one.circumference_m):
+            apart[one.strap.name] = place, True, w, departure
     tests = zip(straps.adjusted, straps.accepted, straps.w, straps.departure_m, strict=True)
-    for place, accepted, w, departure in tests:
-        if not abs(w) > CRITICAL:
-            continue
+    single = [
+        (place, accepted, w, departure)
+        for place, accepted, w, departure in tests
+        if abs(w) > CRITICAL and not (accepted and straps.reduced[place].strap.name in apart)
+    ]
+    for place, accepted, w, departure in (*apart.values(), *single):
         one = straps.reduced[place]
         named = {
             "name": one.strap.name,
@@ -174,18 +219,25 @@ def _of_courses(job, straps):
                 miss_mm=1000 * (median - nominal),
             )
         yield _problem(text)
-    for name, radius in zip(names, inside, strict=True):
-        if abs(radius - median) > NOMINAL_SHARE * nominal:
-            text = message(
-                "strapped_course_apart",
-                "course {name!r} comes out {miss_mm:+.1f} mm of radius from the others",
-                name=name,
-                miss_mm=1000 * (radius - median),
-            )
-            yield _problem(text, column="course")
     strapped = {one.strap.course for one in straps.reduced}
     both = [i for i, name in enumerate(names) if name in strapped]  # lines tell the others
     exchanged = exchanged_courses(straps.radius_m, plates, both)
+    far = {
+        name: radius - median
+        for name, radius in zip(names, inside, strict=True)
+        if abs(radius - median) > NOMINAL_SHARE * nominal
+    }
+    if not far and exchanged is None:
+        far = _far_from_others(straps, names, inside)
+    for name, away in far.items():
+        text = message(
+            "strapped_course_apart",
+            "course {name!r} comes out {miss_mm:+.1f} mm of radius from the others: did its straps"
+            " lie over an obstruction, or is its plate another one?",
+            name=name,
+            miss_mm=1000 * away,
+        )
+        yield _problem(text, column="course")
     if exchanged is not None:
         one, other, left, steps = exchanged
         text = message(
@@ -201,53 +253,14 @@ def _of_courses(job, straps):
         yield _problem(text, column="course")
 
 
-def exchanged_courses(outside_m, plates_m, both):
-    """The pair of courses that look exchanged, by the steps between neighbouring courses.
-
-    Parameters
-    ----------
-    outside_m, plates_m : ndarray, shape (courses,)
-        Radius of the outside, and plate with paint.
-    both : sequence of int
-        Courses that may be exchanged.
-
-    Returns
-    -------
-    (int, int, float, float) or None
-        The pair, the sum of the steps with it exchanged, and as it is, m; None: too little is
-        saved, or courses whose inside radii scatter as much look so much better exchanged by
-        chance in over one of twenty shells.
-
-    Examples
-    --------
-    >>> plates = np.array([10, 9, 8, 7, 6.3, 6.3]) / 1000
-    >>> inside = 6.5 + np.array([0.1, -0.2, 0.2, 0.0, -0.1, 0.1]) / 1000
-    >>> exchanged_courses((inside + plates)[[0, 4, 2, 3, 1, 5]], plates, range(6))[:2]
-    (1, 4)
+def _far_from_others(straps, names, inside_m):
+    """{name: its radius over that of the others, m} of a course that stands apart, further than
+    a strap of it from its other straps, which is told by itself.
     """
-    if len(both) < 2:
-        return None
-    inside = outside_m - plates_m
-    steps = float(_steps(inside))
-    left, pairs = _steps_exchanged(outside_m, plates_m, both)
-    best = int(np.argmin(left))
-    if left[best] >= EXCHANGED_SHARE * steps or steps - left[best] <= EXCHANGED_M:
-        return None
-    sound = np.random.default_rng(0).normal(size=(DRAWS, len(inside))) * np.std(inside, ddof=1)
-    shares = np.min(_steps_exchanged(sound + plates_m, plates_m, both)[0], axis=-1) / _steps(sound)
-    if np.mean(shares <= left[best] / steps) > BY_CHANCE:
-        return None
-    return *pairs[best], float(left[best]), steps
-
-
-def _steps_exchanged(outside_m, plates_m, both):
-    """(..., k) steps between courses with each pair of them exchanged, and the pairs."""
-    pairs, left = list(combinations(both, 2)), []
-    for i, k in pairs:
-        turned = outside_m.copy()
-        turned[..., [i, k]] = outside_m[..., [k, i]]
-        left.append(_steps(turned - plates_m))
-    return np.stack(left, axis=-1), pairs
+    least = FAR_REPEATS * limit_of_repeats(float(np.median(straps.circumference_m)))
+    found = course_apart(inside_m, least / straps.per_radius)
+    told = {one.strap.course for _, one, _, _ in straps_apart(names, straps)}
+    return {} if found is None or names[found[0]] in told else {names[found[0]]: found[1]}
 
 
 def _steps_inside(job, straps, plates_m):
@@ -285,11 +298,6 @@ def _of_first_course(job, straps):
             ),
             column="checks.circumference_m",
         )
-
-
-def _steps(radii_m):
-    """(...) sum of the steps between neighbouring courses, of radii (..., courses)."""
-    return np.abs(np.diff(radii_m, axis=-1)).sum(axis=-1)
 
 
 def _uncontrolled(job, wall):

@@ -201,7 +201,7 @@ def _doubts_of_wall(job, wall):
     if wall.straps is not None:
         from tankcal.pipeline.strapping_checks import check_straps_beside_points
 
-        beside = check_straps_beside_points(job, wall.straps)
+        beside = check_straps_beside_points(job, wall)
     if job.lines is not None:
         from tankcal.pipeline.line_checks import check_leans
 

@@ -11,6 +11,7 @@ from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import noise_of_wall
 from tankcal.pipeline.level_checks import (
     check_nominal,
+    check_size_told,
     courses_with_few,
     girth_m,
     levels_with_few,
@@ -23,6 +24,7 @@ RULES = "tangents"
 SHOWN = 5
 SUSPECT = 2.0  # test quantity of the worst set-up, from which it is tested by all others
 MANY_LEVELS = 0.5  # of them, off: it is the heights as a whole
+TOGETHER = 0.5  # of what one sight may be off its level: all those of a set-up
 LOST = 0.5  # of the tangents of a set-up, rejected: the set-up is to blame
 WAVES = np.arange(2, 9)  # round a wall: longer than a plate
 
@@ -103,7 +105,16 @@ def check_tangents(job, wall, touching):
         *_of_heights(job, touching),
         *_of_setups(job, tests),
         *check_nominal(job, wall, job.tangents.file),
+        *_of_scale(job),
     )
+
+
+def _of_scale(job):
+    """A traverse whose distances one instrument measured, without a tape or a bar."""
+    read = () if job.measurements is None else job.measurements.readings
+    names = {one.instrument for one in job.tangents.setups.values()}
+    is_alone = len(names) == 1 and "distances" not in {table.table for table in read}
+    return check_size_told(job, [*names]) if is_alone else ()
 
 
 def _of_levels(job, wall):
@@ -187,9 +198,20 @@ def _of_heights(job, touching):
     above = touching.points.xyz_m[:, 2] - job.datum.bottom_z_m
     off = above - job.datum.plate_level_m - tangents.level_m
     there = course_of(above, joints_of(job))
-    most = limits_of(RULES)["level_m"]
+    most, setup = limits_of(RULES)["level_m"], np.array(tangents.setup)
+    far, high = np.abs(off) > most, _high_setups(setup, off, most)
+    for name, by_m in high.items():
+        text = message(
+            "tangents_of_high_setup",
+            "the tangents of set-up {setup!r} touch the wall {off:+.2f} m from their levels, those"
+            " of the others at them: is the height of its instrument or its station wrong?",
+            setup=name,
+            off=by_m,
+        )
+        yield Problem("setups.csv", text, tangents.setups[name].row, "instrument_height_m")
+    far &= ~np.isin(setup, list(high))
     wrong = {}
-    for place in np.flatnonzero(np.abs(off) > most):
+    for place in np.flatnonzero(far):
         key = tangents.course[place], float(tangents.level_m[place]), names[int(there[place])]
         wrong.setdefault(key, []).append(place)
     if len(wrong) > MANY_LEVELS * len(tangents.levels[1]):
@@ -197,7 +219,7 @@ def _of_heights(job, touching):
             "tangents_off_levels",
             "the tangents touch the wall {off:+.2f} m from their levels: are bottom_z_m, the"
             " heights of the stations or those of the instruments wrong?",
-            off=float(np.median(off)),
+            off=float(np.median(off[far])),
         )
         yield Problem(tangents.file, text, None, "level_m")
         return
@@ -214,6 +236,22 @@ def _of_heights(job, touching):
             other=other,
         )
         yield Problem(tangents.file, text, _row(tangents, places[0]), "level_m")
+
+
+def _high_setups(setup, off_m, most_m):
+    """{set-up: by how much} of those whose sights all touch the wall so far from their levels, each
+    by about as much; {}: most set-ups do, or none.
+
+    setup, off_m  (n,) of each sight; nan: it has no zenith angle
+    most_m        that one sight may
+    """
+    found, names = {}, np.unique(setup)
+    for name in names:
+        own = off_m[(setup == name) & np.isfinite(off_m)]
+        by = float(np.median(own)) if len(own) else 0.0
+        if abs(by) > TOGETHER * most_m and np.median(np.abs(own - by)) < abs(by) / 4:
+            found[str(name)] = by
+    return found if 2 * len(found) < len(names) else {}
 
 
 def _row(tangents, place):

@@ -51,9 +51,10 @@ from tankcal.planning.checks.placed import check_plan
 from tankcal.planning.contract import JOB_TABLES, REPEATED, SINGLE, TABLES
 from tankcal.planning.fields import Count
 from tankcal.planning.given import PLAN_FILE, Entry, Given
+from tankcal.planning.wall.checks import check_sections
 from tankcal.planning.wall.contract import OF_WALL
 from tankcal.planning.wall.contract import TABLES as WALL_TABLES
-from tankcal.planning.wall.reading import check_sections, is_wall_plan, wall_plan_of
+from tankcal.planning.wall.reading import is_wall_plan, wall_plan_of
 from tankcal.text.numerals import NUMBER
 
 OF_LIQUID = ("horizontal", "sphere")  # kinds that runs of liquid alone may measure

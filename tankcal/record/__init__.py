@@ -14,6 +14,9 @@ __all__ = [
     "record_of_adjustment", "save", "version_of", "whole",
 ]  # fmt: skip
 
+ROWS_AT_ONCE = 1000  # of a table, as JSON
+_JSON = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+
 
 def record_of(result):
     """The record of a result: everything that paper needs, so that paper needs nothing else.
@@ -59,10 +62,25 @@ def save(record, path):
         Of `record_of`.
     path : path
     """
-    text = json.dumps(
-        split(record, Path(path).parent), ensure_ascii=False, allow_nan=False, separators=(",", ":")
-    )
-    Path(path).write_text(text + "\n", encoding="utf-8")
+    with Path(path).open("w", encoding="utf-8") as file:
+        file.writelines(_pieces(split(record, Path(path).parent)))
+        file.write("\n")
+
+
+def _pieces(value):
+    """The JSON of plain data in pieces, of a long table so many rows: the whole takes much room."""
+    if isinstance(value, dict) and value:
+        for number, (name, item) in enumerate(value.items()):
+            yield f"{',' if number else '{'}{_JSON.encode(name)}:"
+            yield from _pieces(item)
+        yield "}"
+    elif isinstance(value, list) and len(value) > ROWS_AT_ONCE:
+        for start in range(0, len(value), ROWS_AT_ONCE):
+            yield "," if start else "["
+            yield _JSON.encode(value[start : start + ROWS_AT_ONCE])[1:-1]
+        yield "]"
+    else:
+        yield _JSON.encode(value)
 
 
 def load(path):

@@ -8,7 +8,7 @@ from scipy.special import fdtri, gammaincinv
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.geometry.rotations import angle_derivatives, angles_of
 from tankcal.record.columns import ArrayColumns, ArrayRows, Texts, plain_if_short
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Finite, Saved, filled_from, key
 from tankcal.survey.network.quality import ellipsoid_factor, ellipsoids, precision
 
 ELLIPSE = 0.95  # probability of the ellipses and ellipsoids that are drawn and listed
@@ -34,8 +34,8 @@ class AdjustedPoint(Saved):
 class EllipsoidFactor(Saved):
     """Semi-axes of an ellipsoid in those of the standard one."""
 
-    probability: float = key("that it holds the point")
-    factor: float = key("times the standard ellipsoid")
+    probability: Finite = key("that it holds the point")
+    factor: Finite = key("times the standard ellipsoid")
 
 
 class PointPrecision(Saved):
@@ -52,7 +52,7 @@ class PointPrecision(Saved):
     extent_m: float = key("diagonal of the box around the points")
     proportional: float = key("precision is 1 : this")
     ellipsoid_factors: list[EllipsoidFactor] = key("for other probabilities")
-    ellipse_probability: float = key("of the ellipses and ellipsoids that are listed")
+    ellipse_probability: Finite = key("of the ellipses and ellipsoids that are listed")
 
 
 class AdjustedPhoto(Saved):
@@ -60,12 +60,12 @@ class AdjustedPhoto(Saved):
 
     photo: str = key("name")
     camera: str = key("name")
-    x_m: float = key("projection centre")
-    y_m: float = key("projection centre")
-    z_m: float = key("projection centre")
-    omega_deg: float = key("angle about x")
-    phi_deg: float = key("angle about y")
-    kappa_deg: float = key("angle about z")
+    x_m: Finite = key("projection centre")
+    y_m: Finite = key("projection centre")
+    z_m: Finite = key("projection centre")
+    omega_deg: Finite = key("angle about x")
+    phi_deg: Finite = key("angle about y")
+    kappa_deg: Finite = key("angle about z")
     sx_m: float = key("sd")
     sy_m: float = key("sd")
     sz_m: float = key("sd")
@@ -84,9 +84,9 @@ class AdjustedCamera(Saved):
     convention: str = key("sign of the distortion's terms", of="form.convention")
     affinity: str = key("form of the affinity terms", of="form.affinity")
     radial_balance_mm: float = key("0: not balanced", of="form.radial_balance_mm")
-    format_mm: list[float] | None = key("width and height of the image")
+    format_mm: list[Finite] | None = key("width and height of the image")
     pixel_mm: list[float] | None = key("sides of a pixel", of="frame.pixel_mm")
-    edge_mm: list[float] = key("half width and half height that edge_um is of", of="frame.half_mm")
+    edge_mm: list[Finite] = key("half width and half height that edge_um is of", of="frame.half_mm")
     edge_known: bool = key("false: only seen by the points", of="frame_known")
     reach_mm: float = key("of the farthest image point from the middle", of="frame.reach_mm")
     parameters: list[str] = key("names of those of the model; the lists below are in their order")
@@ -121,12 +121,12 @@ class ControlSystem(Saved):
     """A further system of control: X_system = (1 + scale) R X + shift."""
 
     system: str = key("name")
-    x_m: float = key("shift")
-    y_m: float = key("shift")
-    z_m: float = key("shift")
-    omega_deg: float = key("of R")
-    phi_deg: float = key("of R")
-    kappa_deg: float = key("of R")
+    x_m: Finite = key("shift")
+    y_m: Finite = key("shift")
+    z_m: Finite = key("shift")
+    omega_deg: Finite = key("of R")
+    phi_deg: Finite = key("of R")
+    kappa_deg: Finite = key("of R")
     s_omega_deg: float = key("sd")
     s_phi_deg: float = key("sd")
     s_kappa_deg: float = key("sd")

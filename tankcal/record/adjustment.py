@@ -30,7 +30,7 @@ from tankcal.record.images import (
     fiducials_of,
     image_readings_of,
 )
-from tankcal.record.schema import Columns, Saved, filled_from, key
+from tankcal.record.schema import Columns, Finite, Saved, filled_from, key
 from tankcal.record.texts import Text, text_of
 from tankcal.survey.results import DatumReport, GroupOfReadings, Reading, Readings
 
@@ -125,15 +125,15 @@ class AdjustmentRecord(Saved):
     rounds: int = key("adjustments that the search for blunders took")
     chi2: float = key("v'Pv")
     chi2_bounds: list[float] | None = key("two-sided bounds of chi2; null: nothing is redundant")
-    confidence: float = key("of these bounds")
+    confidence: Finite = key("of these bounds")
     passed: bool | None = key("whether chi2 lies between them")
     cov_scale: float = key("factor of every covariance of the record: 1, or sigma0 squared")
     scale: str = key('"a_priori" or "a_posteriori"')
     snooping: bool = key("whether blunders were searched for")
     critical_w: float = key("beyond which a reading is set aside")
     critical_tau: float | None = key("of tau")
-    alpha: float = key("level of the tests of single readings")
-    power: float = key("of these tests, for the mdb")
+    alpha: Finite = key("level of the tests of single readings")
+    power: Finite = key("of these tests, for the mdb")
     datum: DatumReport = key("what holds the frame")
     groups: list[AdjustedGroup] = key("kinds of observations and instruments")
     held: list[HeldValue] = key("values that hold exactly: sd 0")

@@ -7,7 +7,7 @@ import numpy as np
 from tankcal.record.cloud_inside import InsideSeen, inside_of
 from tankcal.record.cloud_map import CloudMap, map_of
 from tankcal.record.hits import SharedByHits, shared_of
-from tankcal.record.schema import Saved, key
+from tankcal.record.schema import Finite, Saved, key
 
 ARCSEC = np.pi / 180 / 3600
 SHARED = {"instrument_offset", "instrument_scale", "incidence", "registration"}  # kinds of inputs
@@ -38,9 +38,9 @@ class ScanRegistered(Saved):
     surface: str = key('that it saw; "": all the same')
     tie: str = key('"network" (targets), "frame" (it is the frame itself) or "declared"')
     is_assumed: bool = key("whether its standard deviations are assumed")
-    x_m: float = key("where the scanner stood, in the frame of the tank")
-    y_m: float = key("the same")
-    z_m: float = key("the same")
+    x_m: Finite = key("where the scanner stood, in the frame of the tank")
+    y_m: Finite = key("the same")
+    z_m: Finite = key("the same")
     s_translation_mm: float = key("standard deviation along an axis, root of the mean variance")
     s_rotation_arcsec: float = key("the same about an axis")
     targets: int = key("that its pose was taken from")

@@ -89,7 +89,7 @@ def column_of(values):
     """
     if isinstance(values, np.ndarray | Texts):
         return values
-    kinds = set(map(type, values)) - {type(None)}
+    kinds = {str if issubclass(one, str) else one for one in map(type, values)} - {type(None)}
     if not kinds:
         return np.full(len(values), np.nan)
     if kinds == {str}:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.record.schema import Saved, key
+from tankcal.record.schema import Finite, Saved, key
 from tankcal.survey.control_drift import HOUR_S, drifts_of, repeats_of
 
 CLASS_DEG, LAST_DEG = 10, 90  # of the histogram of incidence
@@ -15,9 +15,9 @@ class HitSetupUsed(Saved):
     station: str = key("that it stood over")
     instrument: str = key("name")
     certificate: str = key('of the instrument; "": not given')
-    x_m: float = key("where its axes cross, in the survey's frame")
-    y_m: float = key("the same")
-    z_m: float = key("the same")
+    x_m: Finite = key("where its axes cross, in the survey's frame")
+    y_m: Finite = key("the same")
+    z_m: Finite = key("the same")
     tie: str = key('"network", "frame" (it is the frame itself) or "wall" (nothing else)')
     hits: int = key("adjusted and not rejected")
     rejected: int = key("hits that are not of the wall, or contradict it")

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.gum.coverage import coverage_factor
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Finite, Saved, filled_from, key
 
 
 class MeterUsed(Saved):
@@ -119,10 +119,10 @@ class LiquidRecord(Saved):
     density_c: float = key("temperature of that")
     expansion_per_k: float = key("of the liquid's volume")
     u_expansion_per_k: float = key("its standard uncertainty")
-    u_temperature_c: float = key("standard deviation of one temperature")
+    u_temperature_c: Finite = key("standard deviation of one temperature")
     u_dip_zero_m: float = key("standard uncertainty of what all dips have in common")
-    lowest_dip_m: float = key("that counts")
-    highest_dip_m: float = key("that counts")
+    lowest_dip_m: Finite = key("that counts")
+    highest_dip_m: Finite = key("that counts")
     meters: list[MeterUsed] = key("in the order of their rows")
     runs: list[RunOfLiquid] = key("in their order")
     run_sd: float = key("standard deviation of the effect of a run, relative")

@@ -93,6 +93,16 @@ def without_collection():
             gc.enable()
 
 
+@contextmanager
+def without_looking_back():
+    """A context in which the garbage collector leaves alone what is there already: it is kept."""
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+
+
 def return_freed_memory():
     """Give memory that was freed back to the machine: what computing leaves is in many pieces.
 

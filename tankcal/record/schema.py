@@ -24,6 +24,7 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 MOST_TOLD = 20  # problems of one file
 Finite = Annotated[float, "finite"]  # a number that is never null
 _SCALARS = {bool: "boolean", int: "integer", str: "string"}
+_WORDS = {"None": "null", "True": "true", "False": "false"}  # of JSON, for those of Python
 _TYPES = {  # of Python, for a type of JSON
     "boolean": {bool}, "integer": {int}, "number": {int, float}, "string": {str},
     "null": {type(None)}, "array": {list}, "object": {dict},
@@ -321,6 +322,7 @@ def _below(path, one):
 
 def _expected(names, value):
     found = repr(value) if not isinstance(value, list | dict) else type(value).__name__
+    found = _WORDS.get(found, found)
     found = found if len(found) <= 40 else f"{found[:37]}..."
     match next(one for one in names if one != "null"):
         case "number":

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
-from tankcal.record.schema import Saved, key
+from tankcal.record.schema import Finite, Saved, key
 from tankcal.record.survey import radius_sd, surveyed_shell
 
 
@@ -36,9 +36,9 @@ class TapeUsed(Saved):
 
     tape: str = key("name")
     certificate: str = key('its number; "": not given')
-    correction: float = key("true = reading (1 + correction)")
-    u_scale: float = key("standard uncertainty of its scale, relative")
-    u_comparison: float = key("the same, by the comparison with its master; 0: none")
+    correction: Finite = key("true = reading (1 + correction)")
+    u_scale: Finite = key("standard uncertainty of its scale, relative")
+    u_comparison: Finite = key("the same, by the comparison with its master; 0: none")
     master: str = key('tape that it was compared with; ""')
     master_certificate: str = key('number of its certificate; "": not given, or no master')
     comparisons: int = key("readings of both")
@@ -69,8 +69,8 @@ class StrappingRecord(Saved):
     shape_sd_m: float = key(
         "standard deviation of the radius round the wall: declared, or by the points"
     )
-    area_term: float = key("by how much the circle of a perimeter is too large, relative")
-    area_term_sd: float = key("its standard deviation")
+    area_term: Finite = key("by how much the circle of a perimeter is too large, relative")
+    area_term_sd: Finite = key("its standard deviation")
     wave_m: float | None = key("bound of how far a tape was out of level; null: not given")
     helix_m: float | None = key("bound of how far its ends stood apart; null: not given")
 

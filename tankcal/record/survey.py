@@ -9,7 +9,7 @@ from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall_straps import mean_radii
 from tankcal.record.columns import ArrayColumns, ArrayRows, plain_if_short
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Finite, Saved, filled_from, key
 from tankcal.sections import coordinates_of
 
 EVEN = 720  # azimuths; they resolve products of an outline with the highest mode of the form
@@ -18,11 +18,11 @@ EVEN = 720  # azimuths; they resolve products of an outline with the highest mod
 class Wall(Saved):
     """The wall as one body."""
 
-    x_m: float = key("a point of the axis, at half height")
-    y_m: float = key("its y")
-    z_m: float = key("its z")
-    slope_x: float = key("of the axis, m/m")
-    slope_y: float = key("of the axis, m/m")
+    x_m: Finite = key("a point of the axis, at half height")
+    y_m: Finite = key("its y")
+    z_m: Finite = key("its z")
+    slope_x: Finite = key("of the axis, m/m")
+    slope_y: Finite = key("of the axis, m/m")
     tilt: float = key("length of the slope, m/m")
     tilt_sd: float = key("its sd")
     tilt_azimuth_deg: float = key("towards which the top leans, clockwise from +y")
@@ -38,9 +38,9 @@ class Place(Saved):
     """A point and its coordinates."""
 
     point: str = key("name")
-    x_m: float = key("in the survey's frame")
-    y_m: float = key("in the survey's frame")
-    z_m: float = key("in the survey's frame")
+    x_m: Finite = key("in the survey's frame")
+    y_m: Finite = key("in the survey's frame")
+    z_m: Finite = key("in the survey's frame")
 
 
 class SurveyedPoint(Place):
@@ -66,8 +66,8 @@ class RejectedPoint(Place):
 class SectionOutline(Saved):
     """The irregular section r(theta) about the circle's centre."""
 
-    azimuth_deg: list[float] = key("each degree")
-    radius_m: list[float] = key("there")
+    azimuth_deg: list[Finite] = key("each degree")
+    radius_m: list[Finite] = key("there")
 
 
 class FormMode(Saved):
@@ -83,19 +83,19 @@ class SectionCircle(Saved):
 
     section: str = key("name", of="group.name")
     course: str = key("that it is in")
-    height_m: float = key("above the bottom", of="group.height_m")
+    height_m: Finite = key("above the bottom", of="group.height_m")
     n: int = key("points")
-    x_m: float = key("centre of the circle", of="circle.x_m")
-    y_m: float = key("centre of the circle", of="circle.y_m")
+    x_m: Finite = key("centre of the circle", of="circle.x_m")
+    y_m: Finite = key("centre of the circle", of="circle.y_m")
     x_sd_m: float = key("its sd")
     y_sd_m: float = key("its sd")
-    radius_m: float = key("of the circle", of="circle.radius_m")
+    radius_m: Finite = key("of the circle", of="circle.radius_m")
     radius_sd_m: float = key("its sd")
     variance_factor: float = key("v'Pv/(n-3): how far from a circle", of="circle.variance_factor")
     shape: str = key('"interpolated" or "smoothed"', of="outline.kind")
     points: list[str] = key("names")
-    azimuth_deg: list[float] = key("of the points")
-    residual_m: list[float] = key("of the points from the circle", of="circle.residuals_m")
+    azimuth_deg: list[Finite] = key("of the points")
+    residual_m: list[Finite] = key("of the points from the circle", of="circle.residuals_m")
     area_m2: float = key("of the irregular section")
     area_sd_m2: float = key("its sd")
     outline: SectionOutline = key("the irregular section")
@@ -106,8 +106,8 @@ class CourseOfShell(Saved):
     """A course: those of the shell, without head, bottom, deadwood or roof."""
 
     course: str = key("name", of="name")
-    bottom_m: float = key("above the bottom of the tank")
-    top_m: float = key("above the bottom of the tank")
+    bottom_m: Finite = key("above the bottom of the tank")
+    top_m: Finite = key("above the bottom of the tank")
     height_m: float = key("of the plates")
     thickness_m: float = key("of the plates")
     paint_m: float = key("thickness")

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.record.hits import departure_from_sections
-from tankcal.record.schema import Saved, key
+from tankcal.record.schema import Finite, Saved, key
 
 MOST_WAVES, PER_WAVE = 6, 4  # highest order of a level's curve; tangents for each of its orders
 
@@ -15,9 +15,9 @@ class TangentSetup(Saved):
     station: str = key("that it stood over")
     instrument: str = key('name; "": nobody said')
     certificate: str = key('of the instrument; "": not given')
-    x_m: float = key("where its axes cross, in the survey's frame")
-    y_m: float = key("the same")
-    z_m: float = key("the same")
+    x_m: Finite = key("where its axes cross, in the survey's frame")
+    y_m: Finite = key("the same")
+    z_m: Finite = key("the same")
     tangents: int = key("adjusted and not rejected")
     rejected: int = key("that are not of the wall, or contradict it")
     checks: int = key("that are only compared")

@@ -119,7 +119,7 @@ def set_papers(notebook, directory, parts, progress=None, **handed):
     """
     from concurrent.futures import ThreadPoolExecutor
 
-    from tankcal.report.document import blocks_of, last_cell
+    from tankcal.report.document import BESIDE, blocks_of, last_cell
     from tankcal.report.notebook import execute, written
     from tankcal.report.pdf import pdf
     from tankcal.report.web import page
@@ -133,7 +133,8 @@ def set_papers(notebook, directory, parts, progress=None, **handed):
     def on_cell(done):
         for name, part in parts:
             if ends[name] == done:
-                pages[name] = pool.submit(pdf, blocks_of(notebook, part), directory)
+                again = bool(part) and part not in BESIDE
+                pages[name] = pool.submit(pdf, blocks_of(notebook, part), directory, again)
         progress(done, total)
 
     with ThreadPoolExecutor(WORKERS) as pool:  # the typesetter works outside Python

@@ -11,11 +11,12 @@ import logging
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 
-from tankcal.errors import TankcalError, VocabularyError
+from tankcal.errors import CellError, TankcalError, VocabularyError
 from tankcal.text.shipped import shipped_folder
 
 TEMPLATES = ("certificate.ipynb", "working_papers.ipynb", "field_table.ipynb")
 FILES_IN_PARAMETERS = ("RECORD", "LETTERHEAD")  # they lie in the folder of the notebook
+BY_VALUES = (LookupError, TypeError, ValueError, AttributeError)  # a record holds something else
 _TEXTS = ("source", "text")
 
 
@@ -83,7 +84,7 @@ def execute(notebook, folder, on_cell=None, **handed):
 
     The templates are our own code: they run in this process, without a kernel, which takes as long
     to start as all of their cells to run. A notebook that somebody changed is a matter for Jupyter
-    or nbconvert. Raises TankcalError naming the cell that failed.
+    or nbconvert. Raises TankcalError naming the cell that failed, CellError where values made it.
     """
     _load_matplotlib()
     shown = []
@@ -101,7 +102,8 @@ def execute(notebook, folder, on_cell=None, **handed):
                 raise
             except Exception as error:
                 first_line = (cell["source"].strip().splitlines() or [""])[0]
-                raise TankcalError(
+                kind = CellError if isinstance(error, BY_VALUES) else TankcalError
+                raise kind(
                     f"the report stopped in cell {number} ({first_line}): "
                     f"{type(error).__name__}: {error}"
                 ) from error

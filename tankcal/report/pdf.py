@@ -6,9 +6,11 @@ No text of a user is ever read as markup, for typst sees it only as strings of t
 import base64
 import json
 import shutil
+from contextlib import nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Lock
 
 from tankcal.errors import TankcalError
 from tankcal.record.plain_data import return_freed_memory
@@ -22,13 +24,17 @@ from tankcal.text.shipped import shipped_folder
 STANDARDS = ["a-3a", "ua-1"]  # archival, and readable by a screen reader
 PLACES = ("asked", "tables", "no")  # who asks for its place on the page (page.typ)
 UNSETTLED = "did not converge"  # in typst's warning that places are not those it set last
+LONG = 5000  # rows of a table: set at once, two documents with more would take gigabytes
+FORGETTING = 12  # pages later the typesetter has thrown away what none of them used
+_ALONE = Lock()
 FONT_FILES = ("STIXGeneral*.ttf", "DejaVuSerif*.ttf", "DejaVuSans.ttf")
 
 
-def pdf(blocks, folder="."):
+def pdf(blocks, folder=".", again=False):
     """The blocks as the bytes of a PDF; the same blocks and attachments give the same bytes.
 
     folder   where the files lie that the document blocks attach
+    again    whether a later document has the same blocks: what is known of them is kept for it
 
     Raises TankcalError when the page cannot be set (a character that no font has, a broken SVG),
     or a file to be attached is not the one that it was.
@@ -40,7 +46,11 @@ def pdf(blocks, folder="."):
     files |= {f"attached-{name}": content for name, content in attached.items()}
     files["main.typ"] = (shipped_folder("report_templates") / "page.typ").read_bytes()
     files["blocks.json"] = json.dumps(blocks, ensure_ascii=False).encode("utf-8")
-    made = _compile(files, _timestamp(blocks[0]["date"]))
+    long = any("table" in block["kind"] and len(block["rows"]) > LONG for block in blocks)
+    with _ALONE if long else nullcontext():
+        made = _compile(files, _timestamp(blocks[0]["date"]))
+        if long and not again:
+            _forget()
     field = next((block["field"] for block in blocks if block.get("field")), None)
     return with_signature_field(made, field) if field else made
 
@@ -82,6 +92,14 @@ def _compile(files, timestamp):
                 return compiled(ignore_system_fonts=False)
         except typst.TypstError as error:
             raise TankcalError(f"the PDF cannot be set: {error.message}") from error
+
+
+def _forget():
+    """Let the typesetter throw away what it has kept: of a long table a gigabyte."""
+    import typst
+
+    for _ in range(FORGETTING):
+        typst.compile(b"", ignore_system_fonts=True)
 
 
 def _copy_fonts(folder):

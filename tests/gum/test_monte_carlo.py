@@ -5,13 +5,28 @@ import pytest
 from scipy import stats
 
 from tankcal.errors import ProgramError
-from tankcal.gum.distributions import Normal, Rectangular, StudentT, Triangular, UShaped, within
+from tankcal.gum.distributions import (
+    CurvilinearTrapezoid,
+    Normal,
+    Rectangular,
+    StudentT,
+    Triangular,
+    UShaped,
+    within,
+)
 from tankcal.gum.monte_carlo import Goal, QuadraticRows, numerical_tolerance, simulate, verdict
 from tankcal.gum.monte_carlo.goal import simulation
 from tankcal.gum.monte_carlo.inputs import inputs_of
 from tankcal.gum.monte_carlo.linear import LEAST, LONG, SHORT, SPACING, Shape, linear_law, shapes_of
-from tankcal.gum.monte_carlo.quadratic import NEAR, _normal_between, _Roots
-from tankcal.gum.monte_carlo.quadratic_rows import POINTS, SETS
+from tankcal.gum.monte_carlo.quadratic import (
+    NEAR,
+    SHORT_STEP,
+    _normal_between,
+    _Roots,
+    _smooth_between,
+)
+from tankcal.gum.monte_carlo.quadratic_rows import NEAR as NEAR_LEVEL
+from tankcal.gum.monte_carlo.quadratic_rows import POINTS, SETS, _scores_near
 from tankcal.uncertainty import coverage_factor
 
 EXACT_RECTANGULAR = 2 * np.sqrt(3) * (2 - (3 / 5) ** 0.25)
@@ -187,6 +202,38 @@ def test_probability_between_ends_of_a_normal(step):
     expected = stats.norm.cdf(last) - stats.norm.cdf(first)
     np.testing.assert_allclose(_normal_between(first, last.copy()), expected, atol=2e-11)
     np.testing.assert_allclose(_normal_between(first[0], last[:1].copy()), expected[:1], atol=2e-11)
+
+
+@pytest.mark.parametrize("step", [0.1 * SHORT_STEP, 0.99 * SHORT_STEP, 0.5])
+@pytest.mark.parametrize("dof", [1.0, 3.0, 50.0])
+def test_probability_between_ends_of_a_smooth_law(step, dof):
+    """Near ends by the density of the tables, others by their cdf; second method: scipy."""
+    shape = Shape(StudentT(1.0, dof=dof), 1.0)
+    first = np.linspace(-6, 6, 201)
+    last = first + step * np.where(np.arange(201) % 2, 1, -1)
+    expected = stats.t(dof).cdf(last) - stats.t(dof).cdf(first)
+    cdf, density = (
+        lambda x, of=of: np.interp(x, shape.value, of) for of in (shape.below, shape.density)
+    )
+    found = _smooth_between(cdf, density, SHORT_STEP, first, last.copy())
+    np.testing.assert_allclose(found, expected, atol=1e-4 * step + 6e-8)
+
+
+def test_which_laws_are_smooth():
+    """Steps and kinks of a density: its characteristic function falls by powers of t only."""
+    kinds = [Rectangular(1.0), UShaped(1.0), Triangular(1.0), CurvilinearTrapezoid(1.0, 0.3)]
+    assert all(Shape(one, one.sd).density is None for one in kinds)
+    assert all(Shape(StudentT(2.0, dof=dof), 2.0).density is not None for dof in (1, 2.5, 30, 200))
+
+
+@pytest.mark.parametrize("reach", [0.99, 3.0])
+def test_scores_of_probabilities_near_their_levels(reach):
+    """Second method: ndtri itself, which those that are not near are given to."""
+    levels = np.array([0.005, 0.025, 0.5, 0.985])
+    density = stats.norm.pdf(stats.norm.ppf(levels))
+    moved = np.linspace(-reach, reach, 12).reshape(3, 4) * NEAR_LEVEL
+    p = np.clip(levels[:, None, None] + density[:, None, None] * moved, 0, 1)
+    np.testing.assert_allclose(_scores_near(levels, p), stats.norm.ppf(p), rtol=0, atol=1e-8)
 
 
 def test_roots_of_parabolas_and_where_there_is_none():

@@ -140,5 +140,5 @@ def test_a_sheet_inside_a_text_is_named_in_words(tmp_path, language, said):
         tankcal.load(write_book(tmp_path / "t.xlsx", parts))
     speak(language)
     told = [say_in_language(one.text) for one in error.value.problems]
-    assert any(f": {said} instruments " in line for line in told)
+    assert any(f", {said} instruments: " in line and f" {said} setups " in line for line in told)
     assert [line for line in told if "sheet " in line] == []

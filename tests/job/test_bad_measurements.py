@@ -292,20 +292,23 @@ def test_a_mesh_takes_no_survey(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("missing", "file", "words"),
+    ("missing", "file", "column"),
     [
-        ("photos", "image_points.csv", "photos.csv is missing or empty"),
-        ("setups", "directions.csv", "setups.csv is missing or empty"),
-        ("cameras", "photos.csv", "cameras.toml is missing or empty"),
-        ("instruments", "distances.csv", "instruments.toml is missing or empty"),
+        ("photos", "image_points.csv", "photo"),
+        ("setups", "slope_distances.csv", "setup"),
+        ("cameras", "photos.csv", "camera"),
+        ("instruments", "setups.csv", "instrument"),
     ],
 )
-def test_a_file_that_others_need(tmp_path, missing, file, words):
+def test_a_file_that_others_need_is_told_once(tmp_path, missing, file, column):
     parts = survey_parts()
-    (parts.tables if missing in parts.tables else parts.registers).pop(missing)
+    is_table = missing in parts.tables
+    (parts.tables if is_table else parts.registers).pop(missing)
     problems = problems_of(write_folder(tmp_path / "job", parts))
-    (problem,) = [problem for problem in problems if problem.file == file]
-    assert words in problem.expected
+    name = f"{missing}.{'csv' if is_table else 'toml'}"
+    (problem,) = [problem for problem in problems if problem.file == name]
+    assert f"the column {column} of {file} refers to its entries" in problem.expected
+    assert not [one for one in problems if name in str(one.expected)]
 
 
 @pytest.mark.parametrize("is_missing", [True, False])

@@ -795,12 +795,12 @@ def _unknown_setup(parts):
 
 def _no_setups(parts):
     del parts.tables["setups"]
-    return [("wall_hits.csv", "setup")]
+    return [("setups.csv", None)]
 
 
 def _no_instruments(parts):
     parts.registers = {}
-    return [("setups.csv", "instrument")]
+    return [("instruments.toml", None)]
 
 
 def _tape_as_instrument(parts):

@@ -10,8 +10,9 @@ from job_builder import S_1, strapped_parts, write_book, write_folder, write_str
 
 import tankcal
 from tankcal.errors import InputError, SolutionError
+from tankcal.pipeline.compared_courses import exchanged_courses
 from tankcal.pipeline.strapped_wall import field_of_readings, find_strapped_wall
-from tankcal.pipeline.strapping_checks import exchanged_courses, limit_of_repeats
+from tankcal.pipeline.strapping_checks import limit_of_repeats
 from tankcal.survey.strapping import Obstruction
 
 OPEN = {0.9: 146.70404, 1.8: 293.40807, 3.6: 586.81461, 6.0: 978.05449, 8.4: 1369.27879}

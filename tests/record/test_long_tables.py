@@ -13,7 +13,7 @@ from test_adjustment_outputs import write_station
 
 import tankcal
 from tankcal.cli import main
-from tankcal.errors import InputError
+from tankcal.errors import InputError, sheet_named
 from tankcal.pipeline.chain import adjust_job
 from tankcal.record import (
     columns,
@@ -65,6 +65,7 @@ def split(short, few_rows, tmp_path):
         [3, 0, None, -7],
         [True, False],
         ["a", None, "", "a", "é\0\n"],
+        [sheet_named("directions"), "control.csv"],
         [["A", "B"], ["A"], [], ["B", "A", "C"]],
         [[True, False, True]],
         [[1.0, None], None, [2.0, 3.0]],

@@ -1,5 +1,7 @@
 """The record: complete, plain, and equal to what was computed."""
 
+import json
+
 import numpy as np
 import pytest
 from job_builder import write_job
@@ -130,3 +132,13 @@ def test_rejected_points_have_row_reason_and_residual(tmp_path):
 
 def test_unused_numbers_are_null(record):
     assert record["rule"] is None
+
+
+@pytest.mark.parametrize("rows", [0, 1, 999, 1000, 1001, 2500])
+def test_a_record_is_written_in_pieces_of_the_same_json(rows, tmp_path):
+    """Second method: all of it at once."""
+    row = {"name": '\u00e9 "', "values": [1.5, None, True], "none": {}}
+    record = {"table": {"rows": [row] * rows, "height_m": [0.1] * rows}, "empty": {}, "n": None}
+    save(record, tmp_path / "record.json")
+    whole = json.dumps(record, ensure_ascii=False, separators=(",", ":"))
+    assert (tmp_path / "record.json").read_text(encoding="utf-8") == whole + "\n"

@@ -12,11 +12,11 @@ from uncertain_job import as_before
 
 from tankcal import report
 from tankcal.cli import main
-from tankcal.errors import InputError
+from tankcal.errors import CellError, InputError
 from tankcal.record import FORMAT, VERSION, load, migrated, version_of
 from tankcal.record.making import Record
 from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import checked, from_plain
+from tankcal.record.schema import MOST_TOLD, checked, from_plain
 from tankcal.record.versions import RECORD
 from tankcal.report import outputs
 
@@ -154,3 +154,81 @@ def test_a_folder_of_results_is_kept_when_its_record_is_refused(tmp_path):
     with pytest.raises(InputError, match="tankcal-record/99"):
         outputs.rebuild(out, out)
     assert [one.name for one in out.iterdir()] == ["record.json"]
+
+
+def numbers_in(value, schema, root, path=()):
+    """The path of each number in data, and whether null may stand for it by the schema."""
+    schema = schema["anyOf"][0] if "anyOf" in schema else schema
+    while "$ref" in schema:
+        schema = root["$defs"][schema["$ref"].rpartition("/")[2]]
+    if isinstance(value, dict):
+        known, other = schema.get("properties", {}), schema.get("additionalProperties", {})
+        for name, item in value.items():
+            yield from numbers_in(item, known.get(name, other), root, (*path, name))
+    elif isinstance(value, list):
+        for number, item in enumerate(value[:2]):
+            yield from numbers_in(item, schema.get("items", {}), root, (*path, number))
+    elif type(value) in (int, float) and "type" in schema:
+        yield path, "null" in schema["type"]
+
+
+def spoilt(record, paths):
+    """A copy of the record with null at each path, and what problems call them."""
+    record, names = json.loads(json.dumps(record)), []
+    for *above, last in paths:
+        place = record
+        for step in above:
+            place = place[step]
+        place[last] = None
+        steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in (*above, last))
+        names.append("".join(steps).removeprefix("."))
+    return record, names
+
+
+def test_null_in_place_of_a_number_is_one_line_with_its_key():
+    """Every number that no record is without, the first two of each list; the others may be."""
+    seen, schema = set(), RECORD.schema()
+    for path in (one for one in ALL if one.name in QUICK):
+        record = migrated(kept(path), "record.json")
+        found = {}
+        for place, nullable in numbers_in(record, schema, schema):
+            key = tuple(step for step in place if not isinstance(step, int))
+            if not nullable and key not in seen:
+                found.setdefault((key, place[-1]), place)
+        seen |= {key for key, _ in found}
+        for places in batched(found.values(), MOST_TOLD):
+            other, names = spoilt(record, places)
+            with pytest.raises(InputError) as told:
+                migrated(other, "record.json")
+            lines = [str(one).partition(": found null, expected a ") for one in told.value.problems]
+            assert sorted(line[0] for line in lines) == sorted(f"record.json, {n}" for n in names)
+            assert all(line[1] for line in lines)
+    places = {f"{of}.{axis}_m" for of in ("points", "adjustment.photos") for axis in "xyz"}
+    assert {*places, "sections.outline.radius_m"} <= {".".join(key) for key in seen}
+
+
+def batched(values, size):
+    values = list(values)
+    return (values[start : start + size] for start in range(0, len(values), size))
+
+
+def test_the_command_names_a_null_coordinate(tmp_path, capsys):
+    (path,) = (one for one in ALL if one.name == "photographed.json.gz")
+    other, _ = spoilt(kept(path), [("points", 1, "z_m")])
+    (tmp_path / "record.json").write_text(json.dumps(other), encoding="utf-8")
+    assert main(["report", str(tmp_path), "--out", str(tmp_path / "out"), "--quiet"]) == 2
+    expected = "tankcal: record.json, points[1].z_m: found null, expected a number\n"
+    assert capsys.readouterr().err == expected
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_cell_that_cannot_work_with_a_record_is_the_records_fault(tmp_path, monkeypatch):
+    """Null where only some tanks may have it: no schema tells, the cell that needs it does."""
+
+    def stopped(*_):
+        raise CellError("the report stopped in cell 10: TypeError")
+
+    (tmp_path / "record.json").write_text(json.dumps(kept(ALL[-1])), encoding="utf-8")
+    monkeypatch.setattr(outputs, "_write", stopped)
+    with pytest.raises(InputError, match=r"record\.json: .*content of a record .*cell 10"):
+        outputs.rebuild(tmp_path, tmp_path / "out")

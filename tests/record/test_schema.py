@@ -113,15 +113,15 @@ def test_a_dataclass_comes_back():
     ("change", "line"),
     [
         ({"volume_m3": [1.0, "x"]}, "t.json, volume_m3[1]: found 'x', expected a number"),
-        ({"volume_m3": [None, 1.0]}, "t.json, volume_m3[0]: found None, expected a number"),
+        ({"volume_m3": [None, 1.0]}, "t.json, volume_m3[0]: found null, expected a number"),
         ({"count": 2.5}, "t.json, count: found 2.5, expected a whole number"),
-        ({"count": True}, "t.json, count: found True, expected a whole number"),
+        ({"count": True}, "t.json, count: found true, expected a whole number"),
         ({"sd": [1]}, "t.json, sd: found list, expected a number"),
         ({"sd": float("inf")}, "t.json, sd: found inf, expected a number"),
         ({"pair": [1.0]}, "t.json, pair: found 1 values, expected 2"),
         ({"note": 7}, "t.json, note: found 7, expected a text"),
         ({"parts": [{"name": "a"}]}, "t.json, parts[].size_mm: missing"),
-        ({"parts": [{"name": None, "size_mm": 1}]}, "t.json, parts[0].name: found None, expected"),
+        ({"parts": [{"name": None, "size_mm": 1}]}, "t.json, parts[0].name: found null, expected"),
         ({"parts": 7}, "t.json, parts: missing"),
     ],
 )

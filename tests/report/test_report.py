@@ -11,8 +11,9 @@ import pytest
 from nbclient import NotebookClient
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
-from tankcal.errors import TankcalError
+from tankcal.errors import CellError, TankcalError
 from tankcal.report import FILES, blocks, build
+from tankcal.report import pdf as pdf_of
 from tankcal.report.document import PARTS, blocks_of, last_cell
 from tankcal.report.latex_math import _FUNCTIONS, _GREEK, _OPERATORS, _SPACES, _SYMBOLS
 from tankcal.report.notebook import execute, joined, written
@@ -263,6 +264,14 @@ def test_failing_cell_stops_the_report_by_name(tmp_path):
         execute(notebook_of("x = 1", "1 / 0"), tmp_path)
 
 
+@pytest.mark.parametrize(("source", "kind"), [("None + 1", CellError), ("1 / 0", TankcalError)])
+def test_what_stopped_a_cell(source, kind, tmp_path):
+    """Values of another kind than a record has, or anything else."""
+    with pytest.raises(TankcalError) as told:
+        execute(notebook_of(source), tmp_path)
+    assert type(told.value) is kind
+
+
 def test_cells_take_what_is_handed_to_them(tmp_path):
     """A parameter that is read already is not read again; the notebook says what it said."""
     notebook = notebook_of("RECORD = 'record.json'", "RECORD['a']")
@@ -393,3 +402,15 @@ def test_templates_have_no_outputs_and_one_parameters_cell():
         "RECORD = 'record.json'\nLANGUAGE = None\nLETTERHEAD = None"
     )
     assert sum("setup" in cell["metadata"]["tags"] for cell in notebook["cells"]) == 1
+
+
+@pytest.mark.parametrize(("rows", "again", "forgets"), [(4, False, 1), (4, True, 0), (3, False, 0)])
+def test_what_is_kept_of_a_long_table_is_forgotten(rows, again, forgets, monkeypatch):
+    """Unless a later document has it again."""
+    done = []
+    monkeypatch.setattr(pdf_of, "LONG", 3)
+    monkeypatch.setattr(pdf_of, "_compile", lambda files, timestamp: b"%PDF")
+    monkeypatch.setattr(pdf_of, "_forget", lambda: done.append("forgot"))
+    table = blocks.table(["a"], [["1"]] * rows).data
+    assert pdf_of.pdf([blocks.document(title="t").data, table], again=again) == b"%PDF"
+    assert len(done) == forgets

@@ -65,16 +65,17 @@ class Inputs:
     def draws(self, uniforms):
         """(draws, n) values x and coordinates e (or None) for (draws, n) uniform numbers."""
         p = np.clip(uniforms, 2.0**-40, 1 - 2.0**-40)
-        scores = ndtri(p)
+        coordinates = np.empty_like(p)
         if self.factor is not None:
-            p = ndtr(scores @ self.factor.T)
+            coordinates[:] = ndtri(p)
+            p = ndtr(coordinates @ self.factor.T)
+        else:
+            coordinates[:, self.normal] = ndtri(p[:, self.normal])
         if self.transform is None:
             return np.column_stack([d.quantile(p[:, j]) for j, d in self._numbered()]), None
-        coordinates = np.empty_like(scores)
         for j, distribution in self._numbered():
-            known = self.normal[j]
-            coordinates[:, j] = scores[:, j] if known else distribution.quantile(p[:, j])
-        coordinates[:, ~self.normal] -= self.mean[~self.normal]
+            if not self.normal[j]:
+                coordinates[:, j] = distribution.quantile(p[:, j]) - self.mean[j]
         return self.mean + coordinates @ self.transform.T, coordinates
 
     def _numbered(self):

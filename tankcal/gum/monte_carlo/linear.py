@@ -15,6 +15,7 @@ SPACING = 0.0025  # of a table of phi, in units of 1/scale
 SHORT, LONG = 1 << 14, 1 << 17  # values of such a table: FEWEST terms need no more than the first
 FEWEST, MOST = 40, 5120  # terms of the sum
 LEAST = 1e-6  # what the terms left out may be worth, as a probability
+SMOOTH = 1e-6  # phi at the end of a short table of what has neither kinks nor steps
 CLOSE = 1e-4  # last step of Newton, in scales: the next one would be some 1e-8
 BLOCK, ROWS = 1 << 18, 256  # numbers held at once, but of so many rows at least
 
@@ -25,6 +26,7 @@ class Shape:
     The input offers `characteristic(t)`, the real E cos(t (X - mean)).
 
     value, below  (m,) values and the probability below each
+    density       (m,) at the values; None where it has kinks or steps, which phi does not forget
     reach         value beyond which the density no longer matters for the sum over k
     second, fourth  moments about the mean, within probabilities 1e-13 and 1 - 1e-13
     """
@@ -38,6 +40,8 @@ class Shape:
         moments = (np.trapezoid(self.value**power, self.below) for power in (2, 4))
         self.second, self.fourth = map(float, moments)
         self._tabulate(SHORT)
+        smooth = np.max(np.abs(self._phi[-8:])) < SMOOTH
+        self.density = np.gradient(self.below, self.value) if smooth else None
 
     def _tabulate(self, length):
         """The characteristic function at 0, SPACING, 2 SPACING, ..."""
@@ -45,9 +49,9 @@ class Shape:
         self._phi = np.asarray(phi, dtype=float)
         self._steps = np.diff(self._phi)
 
-    def characteristic(self, t):
-        """E cos(t e) of t not below 0, linear between the values of the table; 0 beyond it."""
-        place = t * (1 / SPACING)
+    def characteristic(self, t, factor=1.0):
+        """E cos(factor t e), neither below 0, linear between the values of the table; 0 beyond."""
+        place = t * (factor / SPACING)
         most = place.max(initial=0.0)
         if most >= len(self._steps) and len(self._phi) < LONG:
             self._tabulate(LONG)
@@ -121,12 +125,17 @@ class _Sums:
         self.spacing = np.pi / np.maximum(half, 6.0)
         order = np.arange(terms)[:, None] + 0.5
         t = order * (self.spacing / self.scale)
-        phi = np.exp(-((own * t) ** 2) / 2)
+        phi = own * t
+        phi *= phi
+        phi *= -0.5
+        np.exp(phi, out=phi)
         for shape, part in zip(shapes, np.abs(parts.T), strict=True):
-            phi *= shape.characteristic(part * t)
+            phi *= shape.characteristic(t, part)
         last = np.max(np.abs(phi[-8:]), axis=0)
         self.converged = last / (np.pi * order[-1] * self.spacing) < LEAST
-        self.phi = np.stack([phi, phi / order], axis=1)  # of the density, of the cdf
+        self.phi = np.empty((terms, 2, len(own)))  # of the density, of the cdf
+        self.phi[:, 0] = phi
+        np.divide(phi, order, out=self.phi[:, 1])
 
     def only(self, chosen):
         """Keep the chosen rows."""

@@ -19,6 +19,7 @@ from scipy.special import ndtr, ndtri
 STEADY = 16.0  # the parabola turns no nearer than this many scales
 RARE = 1e-3  # part of the draws where it may
 NEAR = 0.03  # ends of a step of the normal distribution that Taylor's series gives to 2e-11
+SHORT_STEP = 0.01  # and those of another smooth one, in scales, that its first term gives to 4e-8
 PEAK = 1 / np.sqrt(2 * np.pi)  # of the normal density
 CELLS = 1 << 16  # draws by rows held at once
 
@@ -104,12 +105,13 @@ class Lines:
         sign = np.sign(rows.jacobian[alone, largest[alone]])
         direction[alone, largest[alone]] = sign
         self.rows, self.direction, self.shapes, self.scale = rows, direction, shapes, scale
-        self.slope = np.sum(rows.jacobian * direction, axis=1)
+        self.slope = np.einsum("ra,ra->r", rows.jacobian, direction)
         twist, by_input = np.zeros(direction.shape[::-1]), np.ascontiguousarray(direction.T)
+        twice = 2 * np.ascontiguousarray(rows.weights.T)
         for form, felt, hessian in rows.own_blocks():
-            twist[felt] += 2 * rows.weights[:, form] * (hessian @ by_input[felt])
+            twist[felt] += twice[form] * (hessian @ by_input[felt])
         self.twist = twist.T
-        self.bend = np.sum(self.twist * direction, axis=1) / 2
+        self.bend = np.einsum("ar,ar->r", twist, by_input) / 2
         self.reach = np.where(together, 1.0, scale[largest])
         self.pure = ~np.any(others != 0, axis=1)  # normal inputs only: the linear part is exact
 
@@ -122,7 +124,7 @@ class Lines:
                 yield int(along), block
 
     def differences(self, along, block, draws, targets, levels, linear):
-        """(sets, block, levels) means over the draws of a set of P(V <= target) - P(L <= linear).
+        """(levels, sets, block) means over the draws of a set of P(V <= target) - P(L <= linear).
 
         draws    e (sets, count, n) and their forms (sets, count, k)
         targets, linear  (block, levels) counted from V0; each P(L <= linear) is its level, added
@@ -139,14 +141,14 @@ class Lines:
         near = np.mean(half < STEADY * np.abs(bend) * self.reach[block], axis=0)
         between, exact = self._between(along), np.all(self.pure[block])
         rest = None if exact else np.subtract(place, lin / slope, out=lin)
-        found = np.empty((len(draws[0]), len(block), len(levels)))
+        found = np.empty((len(levels), len(draws[0]), len(block)))
         root_of, spare = _Roots(half, bend), np.empty_like(place)
         for i, level in enumerate(levels):
             root = root_of(np.subtract(targets[:, i], value, out=spare))
             root += place
             inside = between(ndtri(level) if exact else rest + linear[:, i] / slope, root)
-            found[:, :, i] = inside.reshape(len(found), -1, len(block)).mean(axis=1)
-        found += levels
+            found[i] = inside.reshape(len(draws[0]), -1, len(block)).mean(axis=1)
+            found[i] += level
         return found, near
 
     def _between(self, along):
@@ -156,10 +158,29 @@ class Lines:
         """
         if along < 0:
             return _normal_between
-        shape = self.shapes[along]
-        value = shape.value * self.scale[along]
+        shape, scale = self.shapes[along], self.scale[along]
+        value = shape.value * scale
         cdf = partial(np.interp, xp=value, fp=shape.below)
-        return lambda first, last: cdf(last) - cdf(first)
+        if shape.density is None:
+            return lambda first, last: cdf(last) - cdf(first)
+        density = partial(np.interp, xp=value, fp=shape.density / scale)
+        return partial(_smooth_between, cdf, density, SHORT_STEP * scale)
+
+    def smooth(self, along):
+        """Whether the law along a direction has neither kinks nor steps."""
+        return along < 0 or self.shapes[along].density is not None
+
+
+def _smooth_between(cdf, density, short, first, last):
+    """F(last) - F(first), in the place of last: of near ones by the density at their middle."""
+    gap = np.subtract(last, first, out=last)
+    if not max(gap.max(), -gap.min()) < short:
+        gap += first
+        return cdf(gap) - cdf(first)
+    middle = 0.5 * gap
+    middle += first
+    gap *= density(middle)
+    return gap
 
 
 def _normal_between(first, last):

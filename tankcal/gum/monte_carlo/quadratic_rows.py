@@ -17,7 +17,8 @@ SETS = 10  # independent point sets
 POINTS = 2048  # of a set; intervals take FIRST to MOST of them
 FIRST, MOST = 8, 1024  # eight of each set are mostly worth 1e7 plain draws
 PILOT = 16, 64  # points of the first set that place the ends: at first, and where they are too few
-STILL = 0.01  # of the lowest level: targets on a normal that moved by less are placed
+STILL = 0.01  # of the lowest level: targets on a smooth law that moved by less are placed
+NEAR = 0.005  # scores that are taken by Taylor's series, to 1e-8
 SIDES = np.array([0.6, 1.0, 1.4])  # levels about an end, by that end's own
 
 
@@ -126,10 +127,10 @@ class _Ends:
             at = place[block]
             target, unbent = self._targets(along, block, PILOT[count > FIRST])
             scores, near = self._scores(along, block, target, count)
-            rising = np.all(np.diff(scores, axis=2) > 0, axis=(0, 2))
+            rising = np.all(scores[1:] > scores[:-1], axis=(0, 1))
             sound = np.flatnonzero(unbent & rising & (near <= RARE))
             base = self.lines.rows.value[block[sound]]
-            found, within = self._invert(scores[:, sound], target[sound])
+            found, within = self._invert(scores[..., sound], target[sound].T)
             inner = np.all(within, axis=0)
             ends[:, :, at[sound[inner]]] = base[inner] + found[:, :, inner].swapaxes(0, 1)
             steady[at[sound]] = inner
@@ -143,41 +144,58 @@ class _Ends:
         target = linear + shift[:, None]
         for _ in range(2):
             found, _ = self.lines.differences(along, block, pilot, target, self.levels, linear)
-            moved = (self.levels - found[0]) / slope
+            moved = (self.levels - found[:, 0].T) / slope
             target = target + moved
-            if along < 0 and np.max(np.abs(moved) * slope) < STILL * self.levels[0]:
-                break  # on others, which may have kinks, the ends hang on the targets
+            still = np.max(np.abs(moved) * slope) < STILL * self.levels[0]
+            if still and self.lines.smooth(along):
+                break  # where there are kinks the ends hang on the targets
         return target, np.all(np.abs(moved) * slope < 0.1 * self.levels[0], axis=1)
 
     def _scores(self, along, block, target, count):
-        """(sets, block, levels) normal scores of the probability below the targets."""
+        """(levels, sets, block) normal scores of the probability below the targets."""
         draws = self.sets[:, :count], self.forms[:, :count]
         linear = self.law.quantile[block]
         found, near = self.lines.differences(along, block, draws, target, self.levels, linear)
-        return ndtri(np.clip(found, 1e-9, 1 - 1e-9)), near
+        return _scores_near(self.levels, found), near
 
     def _invert(self, score, target):
         """(4, sets, block) ends of both intervals, and (sets, block) whether the shortest lies
-        inside the levels; score (sets, block, levels), target (block, levels).
+        inside the levels; score (levels, sets, block), target (levels, block).
         """
-        below, above = score[..., :3], score[..., 3:]
-        lower = [_through(below, target[:, :3], s) for s in self.score[:3]]
-        upper = [_through(above, target[:, 3:], s) for s in self.score[3:]]
+        below, above = _parabolas(score[:3], target[:3]), _parabolas(score[3:], target[3:])
+        lower = [below(one) for one in self.score[:3]]
+        upper = [above(one) for one in self.score[3:]]
         first, second, third = (high - low for low, high in zip(lower, upper, strict=True))
         curve = first - 2 * second + third
         offset = np.divide(first - third, 2 * curve, out=np.full_like(curve, 2.0), where=curve > 0)
         within = np.abs(offset) <= 1
         tail = self.levels[1] * (1 + (SIDES[2] - 1) * np.clip(offset, -1, 1))
         high = 1 - 2 * self.levels[1] + tail
-        shortest = (
-            _through(below, target[:, :3], ndtri(tail)),
-            _through(above, target[:, 3:], ndtri(high)),
-        )
+        shortest = below(ndtri(tail)), above(ndtri(high))
         return np.stack([lower[1], upper[1], *shortest]), within
 
 
-def _through(x, y, at):
-    """Parabolas through three points each, x (..., rows, 3) and y (rows, 3), at one place each."""
-    a, b, c = np.moveaxis(x, -1, 0)
-    first, second = (y[:, 1] - y[:, 0]) / (b - a), (y[:, 2] - y[:, 1]) / (c - b)
-    return y[:, 0] + (at - a) * (first + (at - b) * ((second - first) / (c - a)))
+def _scores_near(levels, p):
+    """ndtri(p) of p (levels, sets, rows), by Taylor's series where all are near their levels.
+
+    z + d (1 + z d/2 + (2 z^2 + 1) d^2/6), d = (p - level)/phi(z), short by some (z^3 + z) d^4
+    """
+    z = ndtri(levels)[:, None, None]
+    d = (p - levels[:, None, None]) * (np.sqrt(2 * np.pi) * np.exp(z**2 / 2))
+    if not max(d.max(), -d.min()) < NEAR:
+        return ndtri(np.clip(p, 1e-9, 1 - 1e-9))
+    series = d * ((2 * z**2 + 1) / 6)
+    series += z / 2
+    series *= d
+    series += 1.0
+    series *= d
+    series += z
+    return series
+
+
+def _parabolas(x, y):
+    """Those through three points each, x (3, sets, rows) and y (3, rows), as one function."""
+    a, b, c = x
+    first, second = (y[1] - y[0]) / (b - a), (y[2] - y[1]) / (c - b)
+    bend = (second - first) / (c - a)
+    return lambda at: y[0] + (at - a) * (first + (at - b) * bend)

@@ -52,7 +52,7 @@ def sobol_points(count, inputs, seed):
     shift = random.integers(2, size=(inputs, BITS), dtype=np.uint32) @ WEIGHTS[::-1]
     below = np.tril(random.integers(2, size=(inputs, BITS, BITS), dtype=np.uint32), -1)
     # each digit of a direction number plus a random sum of the digits before it
-    scrambled = (below + np.eye(BITS)) @ _directions(inputs) % 2
+    scrambled = ((below + np.eye(BITS)) @ _directions(inputs)).astype(np.int64) & 1
     numbers = np.vstack([shift, (WEIGHTS @ scrambled).T]).astype(np.int64)
     # in the order of Gray code a point differs from the one before by one direction number
     place = np.arange(1, count)

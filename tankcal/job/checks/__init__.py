@@ -129,7 +129,7 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
         check_sphere(
             values,
             has_wall_points(tables),
-            has_great_circles(tables),
+            has_great_circles(tables) or raw.tables.get("great_circles", ()) is None,
             loads_sphere(values),
             raw,
             log,

@@ -183,7 +183,7 @@ def _of_plates(values, tables, is_loaded, of="courses"):
         why["plate_thickness"] = NOT_SUBTRACTED
     if inside or switches["paint"] is False:
         why["paint"] = NOT_SUBTRACTED
-    if courses is not None and not courses.skipped:
+    if has_rows(courses) and not courses.skipped:
         for name, column in (("plate_thickness", "thickness_mm"), ("paint", "paint_mm")):
             if not why[name] and not any(courses.of(column)):
                 why[name] = message(

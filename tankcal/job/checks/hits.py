@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from tankcal.job.checking import has_rows, refuse_repeated
+from tankcal.job.checking import has_rows, refuse_repeated, tell_missing
 from tankcal.job.checks.extent import has_hits, has_survey, tells_by_tape
 from tankcal.job.checks.strapping import refuse_others, tapes_of
 from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
+from tankcal.job.checks.survey.instruments import check_correction
 from tankcal.job.checks.survey.readings import check_angle
 from tankcal.job.contract.registers import FREE
 from tankcal.messages import message
@@ -107,6 +108,9 @@ def _check_instruments(files, hits):
     setups, ranging = tables["setups"], ranging_of(files.registers)
     if setups is None or raw.registers.get("instruments", 0) is None:
         return
+    if not files.registers["instruments"]:
+        tell_missing(log, raw.file_of("instruments"), setups.file, "instrument")
+        return
     used = instruments_used(setups, ranging)
     file, told = raw.file_of("instruments"), set()
     rows = dict(zip(setups.of("setup"), setups.rows, strict=True))
@@ -127,6 +131,8 @@ def _check_instruments(files, hits):
             places.setdefault(used[name], []).append(place)
     for name, mine in places.items():
         _check_instrument(files, hits, name, ranging[name], np.array(mine))
+        if not has_survey(tables):  # else all instruments are asked
+            check_correction(files, name, ranging[name])
 
 
 def _check_instrument(files, hits, name, given, mine):
@@ -147,6 +153,7 @@ def _check_instrument(files, hits, name, given, mine):
     offset = given["u_offset_mm"]
     is_known = offset is not None and (offset != FREE or _told_by_network(files, name))
     told = tells_by_tape(files.tables) or len(set(hits.of("setup"))) > 1  # from both sides, perhaps
+    told = told or files.is_unreadable("circumferences")
     if not is_known and not told:
         files.tell_key(files.log.problem, "instruments", name, "u_offset_mm", offset_unknown())
 

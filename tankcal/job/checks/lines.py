@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.job.checking import has_rows, refuse_repeated
+from tankcal.job.checking import has_rows, refuse_repeated, tell_missing
 from tankcal.job.checks.extent import has_wall_points, is_strapped
 from tankcal.job.checks.strapping import (
     check_levels,
@@ -47,7 +47,8 @@ def check_lines(values, tables, registers, raw, log):
             "lines_incomplete",
             "no rows; expected them: reference lines need lines.csv and offsets.csv",
         )
-        log.problem(raw.file_of(missing), expected)
+        if raw.tables.get(missing, ()) is not None:  # else it is told already
+            log.problem(raw.file_of(missing), expected)
         return
     if not is_strapped(tables) and not has_wall_points(tables):
         expected = message(
@@ -56,7 +57,8 @@ def check_lines(values, tables, registers, raw, log):
             " offsets give differences of radii only",
             file=raw.file_of("circumferences"),
         )
-        log.problem(offsets.file, expected)
+        if raw.tables.get("circumferences", ()) is not None:  # else it is told already
+            log.problem(offsets.file, expected)
         return
     if len(offsets.rows) > MOST_OFFSETS:
         log.problem(offsets.file, too_many_offsets(len(offsets.rows)))
@@ -144,6 +146,12 @@ def _check_lines(lines, log):
 
 def _check_plummets(lines, offsets, plummets, raw, log):
     file, used = raw.file_of("instruments"), plummets_used(lines, plummets)
+    register = raw.registers.get("instruments", ())
+    if register is None:  # unreadable, which is told
+        return
+    if not (register and register.entries) and any(lines.of("instrument")):
+        tell_missing(log, file, lines.file, "instrument")
+        return
     for row, name in zip(lines.rows, used, strict=True):
         if name not in plummets:
             expected = message(
@@ -154,8 +162,7 @@ def _check_plummets(lines, offsets, plummets, raw, log):
                 hint=nearest(name, plummets) if name else "",
             )
             log.problem(lines.file, expected, row, "instrument")
-    register = raw.registers.get("instruments")
-    if register is None:
+    if not register:
         return
     turned = _turned(lines, offsets, used)
     for name in dict.fromkeys(used):

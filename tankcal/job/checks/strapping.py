@@ -7,13 +7,14 @@ from tankcal.job.checking import (
     has_rows,
     is_not_given,
     tell,
+    tell_missing,
     temperature_missing,
 )
 from tankcal.job.checks.extent import has_radii, has_wall_points, is_strapped
+from tankcal.job.checks.obstructions import check_obstructions
 from tankcal.job.checks.spans import check_spans
 from tankcal.job.contract.observations import READINGS
 from tankcal.job.contract.registers import FREE
-from tankcal.job.contract.strapping import NEEDED
 from tankcal.job.tables import nearest
 from tankcal.messages import message
 
@@ -43,7 +44,7 @@ def check_strapping(values, tables, registers, raw, log):
     courses = tables["courses"]
     known = () if courses is None else tuple(courses.of("course"))
     alone = _stands_alone(tables, raw)
-    every = alone and not has_radii(tables) and raw.tables.get("radii", ()) is not None
+    every = alone and _tell_each_course(tables, raw)
     _check_courses(straps, tables, courses, known, every, log)
     check_readings(straps, tables, registers, raw, log)
     if has_rows(tables["thickness"]):
@@ -61,16 +62,32 @@ def check_readings(straps, tables, registers, raw, log):
     tapes = tapes_of(registers)
     _check_tapes(straps, registers["instruments"], tapes, raw, log)
     _check_pulls(straps, log)
-    _check_obstructions(tables["obstructions"], set(straps.of("circumference")), log)
     if has_rows(tables["obstructions"]):
+        names = set(straps.of("circumference"))
+        refuse_others(tables["obstructions"], "circumference", names, log)
+        check_obstructions(tables["obstructions"], log)
         check_spans(tables["obstructions"], straps, tapes_read(straps, tapes), tapes, raw, log)
     _check_comparisons(tables["tape_checks"], tapes, raw, log)
 
 
 def _stands_alone(tables, raw):
-    """Was the wall strapped and nothing else? A table of its points that cannot be read is one."""
+    """Was the wall strapped and nothing else? A table of its points that cannot be read is one, and
+    set-ups of which nothing was sighted are told by themselves.
+    """
     unreadable = (raw.tables.get(name, ()) is None for name in ("points", "wall_hits", *READINGS))
-    return not has_wall_points(tables) and not any(unreadable)
+    return not (has_wall_points(tables) or has_rows(tables["setups"]) or any(unreadable))
+
+
+def _tell_each_course(tables, raw):
+    """Is a course without a circumference a problem? Not where lines or radii may tell it, be they
+    incomplete or unreadable, which is told.
+    """
+    others = ("radii", "lines", "offsets")
+    unreadable = any(raw.tables.get(name, ()) is None for name in others)
+    elsewhere = any(has_rows(tables.get(name)) for name in others)
+    complete = has_rows(tables["lines"]) and has_rows(tables["offsets"])
+    declared = not is_not_given(raw, "radii", "source")
+    return not (unreadable or declared or has_radii(tables)) and (complete or not elsewhere)
 
 
 def tapes_of(registers):
@@ -169,6 +186,11 @@ def _check_tapes(straps, instruments, tapes, raw, log):
     straps  readings with instrument; instruments, tapes  {name: {key: value}}
     """
     file = raw.file_of("instruments")
+    if raw.registers.get("instruments", ()) is None:  # unreadable, which is told
+        return
+    if not instruments:
+        tell_missing(log, file, straps.file, "instrument")
+        return
     for row, name, tape in zip(
         straps.rows, straps.of("instrument"), tapes_read(straps, tapes), strict=True
     ):
@@ -187,8 +209,6 @@ def _check_tapes(straps, instruments, tapes, raw, log):
                 hint=nearest(tape, tapes) if found is None else "",
             )
             log.problem(straps.file, expected, row, "instrument")
-    if "instruments" not in raw.registers or raw.registers["instruments"] is None:
-        return
     rows = raw.registers["instruments"].rows
     for name in dict.fromkeys(tapes_read(straps, tapes)):
         given = tapes.get(name)
@@ -262,36 +282,10 @@ def _missing_of_certificate(given, certificate):
         )
 
 
-def _check_obstructions(table, names, log):
-    """Obstructions on circumferences of these names, with the lengths of their kinds."""
-    if not has_rows(table):
-        return
-    refuse_others(table, "circumference", names, log)
-    for place, (row, kind) in enumerate(zip(table.rows, table.of("kind"), strict=True)):
-        for column in NEEDED.get(kind, ()):
-            if table.of(column)[place] is None and not log.has(table.file, row, column):
-                expected = message(
-                    "obstruction_incomplete",
-                    "blank; expected it of an obstruction of kind {of_kind}",
-                    of_kind=kind,
-                )
-                log.problem(table.file, expected, row, column)
-        over, arc = table.of("over_mm")[place], table.of("arc_mm")[place]
-        if kind == "step_over" and None not in (over, arc) and over < arc:
-            expected = message(
-                "step_over_too_short",
-                "found {over:g}; expected at least the arc of the shell, {arc:g}: over an"
-                " obstruction the way is longer",
-                over=over,
-                arc=arc,
-            )
-            log.problem(table.file, expected, row, "over_mm")
-
-
 def _check_comparisons(table, tapes, raw, log):
     """Comparisons of one working tape, where there is one."""
     working = [name for name, given in tapes.items() if given["master"] is not None]
-    if has_rows(table) and len(working) != 1:
+    if has_rows(table) and tapes and len(working) != 1:
         expected = message(
             "comparison_of_no_tape",
             "found {count} tapes with a master in {file}; expected one: these readings are its own",
@@ -299,7 +293,7 @@ def _check_comparisons(table, tapes, raw, log):
             file=raw.file_of("instruments"),
         )
         log.problem(table.file, expected)
-    if working and not has_rows(table):
+    if working and not has_rows(table) and raw.tables.get("tape_checks", ()) is not None:
         expected = message(
             "master_not_compared",
             "found a master, but no comparison with it; expected readings in tape_checks.csv",

@@ -180,7 +180,13 @@ CAMERA = (
     *_FOCUS,
 )
 INSTRUMENT = (
-    Field("kind", "text", f"{', '.join(INSTRUMENT_KINDS)}, or another one", required=True),
+    Field(
+        "kind",
+        "text",
+        f"{', '.join(INSTRUMENT_KINDS)}, or another one",
+        required=True,
+        choices=INSTRUMENT_KINDS,
+    ),
     Field("certificate", "text", "number of its certificate; printed when given"),
     Field(
         "certified_temperature_c",

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from tankcal import record as records
 from tankcal import report
-from tankcal.errors import InputError, Problem, TankcalError, VocabularyError
+from tankcal.errors import CellError, InputError, Problem, TankcalError, VocabularyError
 from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.messages import message
 from tankcal.record import long_tables
-from tankcal.record.plain_data import without_collection
+from tankcal.record.plain_data import without_collection, without_looking_back
 from tankcal.report import dcc, folders, manifest
 from tankcal.report.attachments import sha256
 from tankcal.report.outputs import tables
@@ -115,7 +115,7 @@ def rebuild(record_path, directory, progress=None, language=None, letterhead=Non
 
     try:
         return _write(prepare, directory, progress, language, letterhead)
-    except VocabularyError as error:
+    except (VocabularyError, CellError) as error:
         found = message("record_speaks_otherwise", "does not have the content of a record "
                                                    "({what})",
                         what=str(error))  # fmt: skip
@@ -160,7 +160,8 @@ def _write(prepare, directory, progress, language=None, letterhead=None, papers=
             record = prepare(temporary)
             tables.write_tables(record, temporary)
         if papers:
-            _write_papers(record, temporary, progress, language, letterhead)
+            with without_looking_back():
+                _write_papers(record, temporary, progress, language, letterhead)
     return [Path(directory) / name for name in FILES if (Path(directory) / name).exists()]
 
 

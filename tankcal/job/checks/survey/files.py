@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tankcal.job.checking import tell_missing
 from tankcal.job.entries import as_spelt
 from tankcal.job.fields import is_blank
 from tankcal.job.tables import REGISTERS, nearest
@@ -70,13 +71,7 @@ def refuse_undefined(files, table, column, defined, where):
             count[name] = count.get(name, 0) + 1
     file = files.raw.file_of(where)
     if first and not defined:
-        row = min(first.values())
-        expected = message(
-            "register_missing",
-            "{file} is missing or empty; expected it: this column refers to its entries",
-            file=file,
-        )
-        files.log.problem(table.file, expected, row, column)
+        tell_missing(files.log, file, table.file, column)
         return
     for number, (name, row) in enumerate(first.items()):
         hint = nearest(name, defined) if number < MAX_HINTS else ""

@@ -6,7 +6,7 @@ from tankcal.job.checking import has_rows, refuse_repeated, temperature_missing
 from tankcal.job.checks.survey.files import refuse_undefined
 from tankcal.messages import message
 
-DOUBTFUL_CORRECTION = 0.01
+DOUBTFUL_CORRECTION = 5e-4  # no sound instrument is off by more
 TAKEN_FROM_SETUPS = ("slope_distances", "directions", "zenith_angles")
 
 
@@ -28,8 +28,9 @@ def check_instruments(files):
         _check_temperatures(files, distances, instruments)
 
 
-def _check_instrument(files, name, given):
-    correction, expansion = given["correction"], given["expansion_per_k"]
+def check_correction(files, name, given):
+    """Warn of a scale that no instrument has: a percentage, or a millimetre for a metre."""
+    correction = given["correction"]
     if correction is not None and abs(correction) > DOUBTFUL_CORRECTION:
         expected = message(
             "large_correction",
@@ -38,7 +39,13 @@ def _check_instrument(files, name, given):
             ppm=1e6 * correction,
         )
         files.tell_key(files.log.warning, "instruments", name, "correction", expected)
-    if expansion and not files.is_given("instruments", name, "certified_temperature_c"):
+
+
+def _check_instrument(files, name, given):
+    check_correction(files, name, given)
+    if given["expansion_per_k"] and not files.is_given(
+        "instruments", name, "certified_temperature_c"
+    ):
         key = "certified_temperature_c"
         files.tell_key(files.log.problem, "instruments", name, key, temperature_missing())
 

@@ -1,6 +1,6 @@
 """Readings of a stadia: its bar described, its set-ups known, its angles those of a distance."""
 
-from tankcal.job.checking import has_rows
+from tankcal.job.checking import has_rows, tell_missing
 from tankcal.job.checks.survey.files import refuse_undefined
 from tankcal.job.checks.survey.readings import check_angle
 from tankcal.job.contract.stadia import KIND
@@ -36,6 +36,9 @@ def check_bars(files, table):
                 )
                 files.tell_key(files.log.problem, "instruments", name, key, expected)
     if files.raw.registers.get("instruments", 0) is None:  # unreadable, which is told
+        return
+    if not files.registers["instruments"]:
+        tell_missing(files.log, files.raw.file_of("instruments"), table.file, "bar")
         return
     told = set()
     for row, bar in zip(table.rows, bars_used(table, bars), strict=True):

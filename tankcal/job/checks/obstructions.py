@@ -1,0 +1,55 @@
+"""What was in the way of a tape: its lengths are there, and what such a thing has."""
+
+from tankcal.job.contract.strapping import NEEDED
+from tankcal.messages import message
+
+THICK_WELD_MM = 5.0
+
+
+def check_obstructions(table, log):
+    """The lengths that obstructions of each kind need, and whether they can be meant."""
+    for place, (row, kind) in enumerate(zip(table.rows, table.of("kind"), strict=True)):
+        for column in NEEDED.get(kind, ()):
+            if table.of(column)[place] is None and not log.has(table.file, row, column):
+                expected = message(
+                    "obstruction_incomplete",
+                    "blank; expected it of an obstruction of kind {of_kind}",
+                    of_kind=kind,
+                )
+                log.problem(table.file, expected, row, column)
+        _check_sizes(table, place, log)
+        over, arc = table.of("over_mm")[place], table.of("arc_mm")[place]
+        if kind == "step_over" and None not in (over, arc) and over < arc:
+            expected = message(
+                "step_over_too_short",
+                "found {over:g}; expected at least the arc of the shell, {arc:g}: over an"
+                " obstruction the way is longer",
+                over=over,
+                arc=arc,
+            )
+            log.problem(table.file, expected, row, "over_mm")
+
+
+def _check_sizes(table, place, log):
+    """Warn of a strip that stands higher than it is wide, and of a weld that no welder leaves."""
+    kind, row = table.of("kind")[place], table.rows[place]
+    high, wide = table.of("thickness_mm")[place], table.of("width_mm")[place]
+    if kind not in ("weld", "butt_strap") or None in (high, wide):
+        return
+    if high > wide:
+        expected = message(
+            "strip_upright",
+            "{high:g} mm thick and {wide:g} mm wide: are the two columns exchanged?",
+            high=high,
+            wide=wide,
+        )
+        log.warning(table.file, expected, row, "thickness_mm")
+    elif kind == "weld" and high > THICK_WELD_MM:
+        expected = message(
+            "weld_thick",
+            "found {high:g} mm; the cap of a weld stands off by {most:g} mm at most: is it that of"
+            " the plate?",
+            high=high,
+            most=THICK_WELD_MM,
+        )
+        log.warning(table.file, expected, row, "thickness_mm")

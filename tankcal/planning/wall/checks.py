@@ -1,0 +1,252 @@
+"""What the sections of a plan of the bare wall say that cannot be meant."""
+
+import math
+
+import numpy as np
+
+from tankcal.job.checks.hits import FEWEST_HITS, MOST_HITS, too_many_hits
+from tankcal.job.checks.lines import MOST_OFFSETS, too_many_offsets
+from tankcal.job.checks.strapping import MOST_STRAPS, too_many_straps
+from tankcal.job.checks.tangents import FEWEST_SETUPS, MOST_TANGENTS, too_many_tangents
+from tankcal.messages import message
+from tankcal.planning.fields import check_form, no_such_name, too_many_sections
+from tankcal.planning.given import PLAN_FILE
+from tankcal.planning.obstacles import check_obstacles
+from tankcal.planning.wall.filling import check_runs
+from tankcal.planning.wall.model import USUAL_AT, even_radius_m, evenness_of_limbs
+
+CLEAR_M, MOST_SECTIONS = 0.5, 50
+LIMBS = ("left", "right")
+UNEVEN = 0.15  # of limbs: nearer to each other than that, they are the same place, about
+SELDOM_MIN = 30.0  # between readings of control targets
+FEWEST_AZIMUTHS = 3  # that a circle goes through
+OF_POINTS = ("pattern", "photo_rings", "setup_rings", "tapes")
+
+
+def check_sections(given, courses, nominal_m, raw, log):
+    """What the sections of a plan say that cannot be meant.
+
+    courses  names, None: unreadable       nominal_m  radius of the tank, None: unreadable
+    raw      RawJob of the plan
+    """
+    for name in OF_POINTS:
+        entries = given.repeated[name] if name in given.repeated else [given.single[name]]
+        for one in entries:
+            if one.filled:
+                expected = message(
+                    "plan_points_and_wall",
+                    "given together with straps, lines, hits, tangents or runs of liquid; expected"
+                    " only one of them: a plan is of targets or of the bare wall",
+                )
+                log.problem(PLAN_FILE, expected, one.row, one.name)
+    for one in (*given.repeated["straps"], *given.repeated["hits"]):
+        for course in one["courses"] or ():
+            if courses and course not in courses:
+                one.tell(log.problem, "courses", no_such_name(course, "courses.csv"))
+    _check_rings(given, nominal_m, log)
+    if courses:
+        _check_hits(given.repeated["hits"], courses, log)
+    check_form(given.single["wall"], log)
+    check_obstacles(given, log)
+    _check_lines_and_ties(given, log)
+    _check_tangents(given, nominal_m, log)
+    check_runs(given, raw.settings.get("liquid", {}).get("run_ppm") is not None, log)
+    if courses:
+        _check_totals(given, courses, log)
+
+
+def _check_rings(given, nominal_m, log):
+    """Not too many sections; set-ups that stand clear of the wall."""
+    for name in ("straps", "hits"):
+        if len(given.repeated[name]) > MOST_SECTIONS:
+            expected = too_many_sections(len(given.repeated[name]), MOST_SECTIONS)
+            log.problem(PLAN_FILE, expected, None, name)
+    for one in given.repeated["hits"]:
+        radius = one["radius_m"]
+        if None not in (radius, nominal_m) and abs(radius - nominal_m) < CLEAR_M:
+            expected = message(
+                "plan_setup_at_wall",
+                "found {radius:g} m; expected {clear:g} m or more from the wall, which is at"
+                " {nominal:g} m",
+                radius=radius,
+                clear=CLEAR_M,
+                nominal=nominal_m,
+            )
+            one.tell(log.problem, "radius_m", expected)
+
+
+def _check_hits(rings, courses, log):
+    """Enough hits for the sections of each course, and not more than can be used."""
+    if any(None in (ring["setups"], ring["hits"]) for ring in rings):
+        return  # told already
+    total = 0
+    few = []  # rings
+    for course in courses:
+        here = [ring for ring in rings if course in (ring["courses"] or courses)]
+        aims = [int(ring["setups"] * ring["hits"]) for ring in here]
+        hits = sum(aim * len(percents_of(ring)) for aim, ring in zip(aims, here, strict=True))
+        total += hits
+        if sum(aims) < FEWEST_AZIMUTHS or hits < FEWEST_HITS:
+            few += [ring for ring in here if ring not in few]
+    for ring in few:
+        fewest = max(FEWEST_AZIMUTHS, math.ceil(FEWEST_HITS / len(percents_of(ring))))
+        expected = message(
+            "plan_few_hits",
+            "found {found:g}; expected {fewest} or more: the sections of a course need {hits} hits"
+            " at {azimuths} azimuths at least",
+            found=ring["hits"],
+            fewest=math.ceil(fewest / ring["setups"]),
+            hits=FEWEST_HITS,
+            azimuths=FEWEST_AZIMUTHS,
+        )
+        ring.tell(log.problem, "hits", expected)
+    if total > MOST_HITS:
+        log.problem(PLAN_FILE, too_many_hits(total), None, "hits")
+
+
+def _check_lines_and_ties(given, log):
+    lines = given.single["lines"]
+    if lines.filled and not given.repeated["straps"]:
+        expected = message(
+            "plan_lines_alone",
+            "given without [[straps]]; expected a circumference of one course at least: lines tell"
+            " differences of radii alone",
+        )
+        log.problem(PLAN_FILE, expected, lines.row, "lines")
+    ties = given.single["setup_ties"]
+    if ties.filled and not given.repeated["hits"]:
+        expected = message("plan_ties_alone", "given without [[hits]]; expected set-ups to be tied")
+        log.problem(PLAN_FILE, expected, ties.row, "setup_ties")
+    _check_control(given, log)
+    if ties.filled:
+        _need(ties, ("s_mm", "s_arcsec"), log)
+
+
+def _need(entry, keys, log):
+    """Numbers without which a section says nothing."""
+    for key in keys:
+        if key not in entry.filled:
+            expected = message("plan_number_missing", "missing; expected a number above 0")
+            entry.tell(log.problem, key, expected)
+
+
+def _check_control(given, log):
+    control = given.single["control_targets"]
+    if control.filled and not given.repeated["hits"]:
+        expected = message(
+            "plan_control_alone",
+            "given without [[hits]]; expected set-ups of hits that read control targets",
+        )
+        log.problem(PLAN_FILE, expected, control.row, "control_targets")
+    elif control["every_min"] is not None and control["every_min"] > SELDOM_MIN:
+        expected = message(
+            "plan_control_seldom",
+            "control targets every {every:g} minutes; expected 15 to {most:g}: a tripod that sinks"
+            " in between is seen late",
+            every=control["every_min"],
+            most=SELDOM_MIN,
+        )
+        control.tell(log.warning, "every_min", expected)
+
+
+def _check_tangents(given, nominal_m, log):
+    """A traverse whose stations see each other past the tank, and no other sights beside it."""
+    ring, traverse = given.single["tangents"], given.single["traverse"]
+    if traverse.filled and not ring.filled:
+        expected = message(
+            "plan_traverse_alone",
+            "given without [tangents]; expected limbs that are sighted from it",
+        )
+        log.problem(PLAN_FILE, expected, traverse.row, "traverse")
+    if not ring.filled:
+        return
+    if not traverse.filled:
+        expected = message(
+            "plan_tangents_untied",
+            "given without [traverse]; expected s_mm and s_arcsec of the readings between its"
+            " stations: they tie the sights",
+        )
+        log.problem(PLAN_FILE, expected, ring.row, "tangents")
+    elif not traverse.filled & {"s_mm", "s_bar_arcsec"}:
+        expected = message(
+            "plan_traverse_without_scale",
+            "no distance is measured; expected s_mm, or s_bar_arcsec of a stadia: nothing else"
+            " tells the scale",
+        )
+        traverse.tell(log.problem, "s_mm", expected)
+    elif "bar" in traverse.filled:
+        _need(traverse, ("s_bar_arcsec",), log)
+    for name in ("lines", "hits"):
+        other = given.single.get(name) or next(iter(given.repeated.get(name, ())), None)
+        if other is not None and other.filled:
+            expected = message(
+                "plan_tangents_beside",
+                "given together with [tangents]; expected only one of them: tankcal does not join"
+                " them yet",
+            )
+            log.problem(PLAN_FILE, expected, other.row, name)
+    count, radius = ring["stations"], ring["radius_m"]
+    if count is not None and count < FEWEST_SETUPS:
+        expected = message(
+            "plan_few_stations",
+            "found {found:g}; expected {fewest} or more: each level is sighted from so many",
+            found=count,
+            fewest=FEWEST_SETUPS,
+        )
+        ring.tell(log.problem, "stations", expected)
+        return
+    if None in (count, radius, nominal_m):
+        return
+    least = least_ring_m(count, nominal_m)
+    if radius < least:
+        expected = message(
+            "plan_stations_blind",
+            "found {radius:g} m; expected {least:.2f} m or more: the lines between {count:g}"
+            " stations must pass the wall, which is at {nominal:g} m, by {clear:g} m",
+            radius=radius,
+            least=np.ceil(100 * least) / 100,
+            count=count,
+            clear=CLEAR_M,
+            nominal=nominal_m,
+        )
+        ring.tell(log.problem, "radius_m", expected)
+    elif evenness_of_limbs(count, radius, nominal_m) < UNEVEN:
+        better = even_radius_m(int(count), radius, nominal_m, least)
+        expected = message(
+            "plan_limbs_coincide",
+            "at {radius:g} m the limbs of {count:g} stations fall on nearly the same places of the"
+            " wall, two by two; at {better:.2f} m they lie evenly",
+            radius=radius,
+            count=count,
+            better=better or 2 * radius,
+        )
+        ring.tell(log.warning, "radius_m", expected)
+
+
+def least_ring_m(stations, nominal_m):
+    """Radius of a ring whose stations see each other past the wall."""
+    return float(nominal_m / np.cos(np.pi / stations) + CLEAR_M)
+
+
+def _check_totals(given, courses, log):
+    """Not more readings of a kind than can be used."""
+    straps = sum(
+        len(one["courses"] or courses) * len(percents_of(one)) * int(one["readings"] or 1)
+        for one in given.repeated["straps"]
+    )
+    if straps > MOST_STRAPS:
+        log.problem(PLAN_FILE, too_many_straps(straps), None, "straps")
+    lines, ring = given.single["lines"], given.single["tangents"]
+    levels = len(courses) * len(percents_of(lines))
+    offsets = int((lines["count"] or 0) * (lines["faces"] or 2) * (lines["readings"] or 1)) * levels
+    if lines.filled and offsets > MOST_OFFSETS:
+        log.problem(PLAN_FILE, too_many_offsets(offsets), lines.row, "lines")
+    levels = len(courses) * len(percents_of(ring))
+    tangents = int((ring["stations"] or 0) * (ring["readings"] or 1)) * levels * len(LIMBS)
+    if ring.filled and tangents > MOST_TANGENTS:
+        log.problem(PLAN_FILE, too_many_tangents(tangents), ring.row, "tangents")
+
+
+def percents_of(entry):
+    """Heights of a section in each course, percent of it, from the bottom up."""
+    return tuple(sorted(set(entry["at_percent"] or USUAL_AT)))
