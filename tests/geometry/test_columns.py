@@ -181,7 +181,7 @@ def test_seams_and_fittings_that_look_alike_are_within_u(tmp_path, figure):
     """24 to 72 points a ring, one to three rings: seams, fittings, both, and neither."""
     for kind in ("seams", "fittings", "both", "plain"):
         found = []
-        for seed in range(draws(30, 300)):
+        for seed in range(draws(15, 300)):
             scene = make_scene(np.random.default_rng([17, seed]), kind)
             found.append(judged(scene.wall, scene.survey, tmp_path)[:2])
         off, expanded = np.array(found).T

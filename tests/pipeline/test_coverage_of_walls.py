@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from draws import draws
 from generated_walls import FAMILIES, job_of, make_wall, survey
+from scipy.stats import binom
 
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall import find_wall
@@ -85,6 +86,13 @@ def study(walls, folder, figure, rings=(1, 2, 3), found_of=found_of):
     return parts, wide, totals.reshape(len(FAMILIES) * len(rings), walls).mean(axis=1)
 
 
+def least_in_class(walls, classes):
+    """Share that the worst of so many classes of so many walls has by chance in one of a hundred
+    studies, where each holds `LEAST_IN_CLASS`; of two walls a class both may be out.
+    """
+    return 1 - binom.isf(0.01 / classes, walls, 1 - LEAST_IN_CLASS) / walls
+
+
 @pytest.mark.slow
 def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure):
     """A twentieth of the study."""
@@ -98,5 +106,5 @@ def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure):
     parts, wide, classes = study(walls, tmp_path, figure)
     count = walls * len(classes)
     assert min(parts) > LEAST_HELD - 3 * np.sqrt(0.95 * 0.05 / count)
-    assert min(classes) > LEAST_IN_CLASS - 3 * np.sqrt(0.95 * 0.05 / walls)
+    assert min(classes) >= least_in_class(walls, len(classes))
     assert wide < MOST_WIDE

@@ -7,6 +7,7 @@ hand, and moved the table by more than U without a word before its check was mad
 import numpy as np
 import pytest
 from crews import BOOKS, CrewTank
+from draws import draws
 from job_builder import strapped_parts, write_book, write_folder
 from messages_told import lines
 from scipy.stats import binom
@@ -20,7 +21,7 @@ OF_SLIPS = {
     "strap_contradicts", "strapped_course_apart", "lines_turned_about", "hits_ranged_otherwise",
     "large_correction", "strip_upright", "weld_thick", "tangents_of_high_setup",
 }  # fmt: skip
-SOUND = 30
+SOUND = draws(8, 30)
 
 
 def computed(folder, book):
@@ -129,10 +130,10 @@ def test_a_constant_in_all_distances_is_told_by_the_drawing(tmp_path, kind, tabl
     assert "size_told_by_distances" not in told
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize("kind", BOOKS)
 def test_sound_books_are_quiet_and_within_u(tmp_path, kind, figure):
-    """Simulation: of 30 sound crews no more are out of U than 95 % intervals leave in 99 of 100."""
+    """Simulation: of sound crews no more are out of U than 95 % intervals leave in 99 of 100."""
     ratios, told = [], []
     for seed in range(SOUND):
         book = book_of(kind, 2000 + seed)

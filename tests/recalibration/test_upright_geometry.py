@@ -226,7 +226,7 @@ def test_many_simulated_tables(figure):
 
     Of 200 normal errors one in two such studies has one beyond 3 u; three or more are a finding.
     """
-    drawn = [_read_drawn(seed) for seed in range(draws(20, 200))]
+    drawn = [_read_drawn(seed) for seed in range(draws(12, 200))]
     off, w, heads = (np.array(one) for one in zip(*drawn, strict=True))
     figure("largest error of a radius, mm", off.max())
     figure("largest error of a density over its u", np.abs(w).max())
@@ -239,7 +239,7 @@ def test_many_simulated_tables(figure):
 @pytest.mark.study
 def test_many_tables_without_head():
     """Simulation: 99 % of tables without a head are told so."""
-    count = draws(20, 200)
+    count = draws(12, 200)
     tanks = [draw_tank(np.random.default_rng(1000 + seed), density=0.0) for seed in range(count)]
     right = sum(read(tank, table_of(tank)).head == "without" for tank in tanks)
     assert right >= 0.99 * count

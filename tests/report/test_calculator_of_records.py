@@ -23,7 +23,7 @@ OWN = {"product_chosen": WORDS["calculator"]["products"]["own_factor"], "own_fac
 DENSITIES = [700.0, 775.0, 850.0, 1000.0, 1001.0, 690.0]
 AT_DIP = 5.0
 FEW = {"points": 1.3, "seams": 2.5, "ovality": 4.0, "datum": 3.7, "paint": 1.0, "expansion": 30.0}
-NEAR_1000 = {"points": 900.0, "seams": 3.0}  # where one formula of k gives way to the other
+NEAR_1000 = {"points": 990.0, "seams": 3.0}  # where one formula of k gives way to the other
 OF_INPUTS = {"few": (FEW, 0.95), "near_1000": (NEAR_1000, 0.9973)}
 
 

@@ -56,8 +56,13 @@ class SimulatedWall:
 
     @property
     def volume_ratio_sd(self):
-        """How well so many surveys tell that: the sd 1/sqrt(2 n) of a ratio of rms."""
-        return float(1 / np.sqrt(2 * self.runs))
+        """How well so many surveys tell that: by the scatter of the squared errors, whose tails are
+        longer than those of normal errors where the sizes of the wall are unsure.
+        """
+        squares = self.errors_m3**2
+        return float(
+            self.volume_ratio * np.std(squares) / np.mean(squares) / 2 / np.sqrt(self.runs)
+        )
 
     @property
     def U_ratios(self):
