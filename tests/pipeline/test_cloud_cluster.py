@@ -281,7 +281,7 @@ def test_a_scheduler_that_dies_is_told(placing):
         stderr=subprocess.DEVNULL,
     )
     try:
-        with distributed.Client(f"127.0.0.1:{port}", timeout=60, set_as_default=False) as client:
+        with distributed.Client(f"127.0.0.1:{port}", timeout=15, set_as_default=False) as client:
 
             class Killing(Telling):
                 def tell(self, read, about):
