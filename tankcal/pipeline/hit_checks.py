@@ -16,8 +16,7 @@ from tankcal.pipeline.level_checks import (
 )
 from tankcal.pipeline.moved_setups import (
     critical_of_ranging,
-    moved_setups,
-    ranged_otherwise,
+    moved_or_ranged,
     worst_setup,
 )
 from tankcal.pipeline.survey_limits import limit_at, limits_of
@@ -190,9 +189,10 @@ def _of_setups(job, wall, sighting):
     away, normal = sight[:, :2], sighting.normal[counted]
     turn = normal[:, 0] * away[:, 1] - normal[:, 1] * away[:, 0]
     along = np.sum(normal * sight, axis=1) / np.linalg.norm(sight, axis=1)
-    given = wall.field, whole, names[at]
-    ranged = ranged_otherwise(*given, along, SUSPECT, wave_m=WAVE_M)
-    moved = moved_setups(*given, np.column_stack([turn, normal[:, :2]]), SUSPECT, wave_m=WAVE_M)
+    columns = np.column_stack([turn, normal[:, :2]])
+    moved, ranged = moved_or_ranged(
+        wall.field, whole, names[at], columns, along, SUSPECT, wave_m=WAVE_M
+    )
     setup = max(ranged, key=lambda one: ranged[one][0])
     (w, longer), most = ranged[setup], max(one[0] for one in moved.values())
     if w > max(critical_of_ranging(len(ranged)), MOSTLY * most) and abs(longer) > MOVED_M:

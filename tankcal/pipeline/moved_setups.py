@@ -49,40 +49,51 @@ def moved_setups(field, whole, names, columns, suspect_from, *, wave_m=0.0):
     dict
         {set-up: (w, its turn alone rad, its shift alone (2,) m)}.
     """
-    whole = whole + _waves(field.sites, wave_m)
-    return _by_setup(field, whole, names, suspect_from, partial(_as_if_moved, columns))
+    test = partial(_as_if_moved, columns)
+    return _by_setup(field, whole, names, suspect_from, wave_m, test)[0]
 
 
-def ranged_otherwise(field, whole, names, along, suspect_from, *, wave_m=0.0):
-    """How much each set-up looks as if all its distances were too long, or too short.
+def moved_or_ranged(field, whole, names, columns, along, suspect_from, *, wave_m=0.0):
+    """The same, and how much each looks as if all its distances were too long, or too short.
 
     Parameters
     ----------
-    field, whole, names, suspect_from, wave_m
+    field, whole, names, columns, suspect_from, wave_m
         As of `moved_setups`.
     along : ndarray, shape (k,)
         Derivative of the readings by an offset of the distances of their set-up.
 
     Returns
     -------
-    dict
+    moved : dict
+        What `moved_setups` finds.
+    ranged : dict
         {set-up: (w, by how much too long m)}.
     """
-    whole = whole + _waves(field.sites, wave_m)
-    return _by_setup(field, whole, names, suspect_from, partial(_as_if_longer, along))
+    tests = partial(_as_if_moved, columns), partial(_as_if_longer, along)
+    return _by_setup(field, whole, names, suspect_from, wave_m, *tests)
 
 
-def _by_setup(field, whole, names, suspect_from, test):
-    """{set-up: test(which readings are its own, P, P y)}; the worst one by all others alone."""
-    count = len(names)
-    precision, pull = tested(field, whole, count)
-    found = {name: test(names == name, precision, pull) for name in dict.fromkeys(names.tolist())}
-    suspect = max(found, key=lambda one: found[one][0])
-    if found[suspect][0] > suspect_from:
+def _by_setup(field, whole, names, suspect_from, wave_m, *tests):
+    """For each test {set-up: test(which readings are its own, P, P y)}; the worst one of each by
+    all other set-ups alone.
+    """
+    count, whole = len(names), whole + _waves(field.sites, wave_m)
+    every, by_others = tested(field, whole, count), {}
+    found = [
+        {name: test(names == name, *every) for name in dict.fromkeys(names.tolist())}
+        for test in tests
+    ]
+    for test, one in zip(tests, found, strict=True):
+        suspect = max(one, key=lambda name, one=one: one[name][0])
+        if one[suspect][0] <= suspect_from:
+            continue
         mine = names == suspect
-        other = _without(field, whole - field.covariance_m2, mine)
-        if other is not None:
-            found[suspect] = test(mine, *tested(field, other, count))
+        if suspect not in by_others:
+            other = _without(field, whole - field.covariance_m2, mine)
+            by_others[suspect] = None if other is None else tested(field, other, count)
+        if by_others[suspect] is not None:
+            one[suspect] = test(mine, *by_others[suspect])
     return found
 
 

@@ -8,11 +8,10 @@ import numpy as np
 
 from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
-from tankcal.geometry.field.blunders import restricted_precision
-from tankcal.geometry.field.sites import free_design
 from tankcal.messages import message
 from tankcal.pipeline.compared_courses import course_apart, exchanged_courses
 from tankcal.pipeline.cross_checks import check_side
+from tankcal.pipeline.moved_setups import tested
 from tankcal.pipeline.survey_limits import limit_at
 from tankcal.pipeline.tape_checks import check_tapes
 from tankcal.pipeline.wall_readings import FORMER
@@ -77,8 +76,8 @@ def strapped_together(wall):
     repeated = [each for each in names.values() if len(each) > 1]
     if not repeated:
         return {}
-    precision = restricted_precision(wall.field.covariance_m2, free_design(wall.field.sites)[0])
-    pull = precision @ (wall.field.radius_m - wall.field.radius_m.mean())
+    every = len(wall.field.radius_m)
+    precision, pull = tested(wall.field, wall.field.covariance_m2, every)
     found = {}
     for each in repeated:
         at = [one for one, _ in each]

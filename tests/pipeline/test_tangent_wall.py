@@ -117,6 +117,11 @@ def test_noise_is_within_U(noisy):
     assert {"instrument_scale", "tangent_excess", "points"} <= budget
 
 
+def test_the_field_knows_of_limbs(noisy):
+    """So that no size of a component is told by another (`test_field`)."""
+    assert noisy.wall.field.sites.limbs
+
+
 @pytest.mark.slow
 def test_valleys_are_within_U(tmp_path):
     result = run(tmp_path, parts_of(sights(valley, rng=np.random.default_rng(2)), seed=2))

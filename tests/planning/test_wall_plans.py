@@ -56,6 +56,13 @@ def prediction(request):
     return predict(load_plan(request.param))
 
 
+def test_only_limbs_leave_sizes_that_tell_nothing_of_each_other(prediction):
+    """As of the jobs, so that a plan foretells their U."""
+    plan, covariance = prediction.plan, prediction.plan.amplitudes.log_covariance
+    apart = np.all(covariance == np.diag(np.diag(covariance)))
+    assert apart == (plan.design.tangents is not None)
+
+
 @pytest.mark.slow
 def test_the_empty_job_filled_in_is_the_plan(prediction, tmp_path):
     """Its U with the plan's amplitudes is the prediction's, in every row."""
