@@ -42,6 +42,7 @@ def check_strapped(job, wall):
         *_of_pairs(job, straps),
         *(_of_courses(job, straps) if job.radii is None else ()),  # else not all were strapped
         *_of_first_course(job, straps),
+        *_of_one_course(job, straps),
         *_uncontrolled(job, wall),
     )
 
@@ -297,6 +298,22 @@ def _of_first_course(job, straps):
             ),
             column="checks.circumference_m",
         )
+
+
+def _of_one_course(job, straps):
+    """A tank whose size the straps of one course alone tell: lines tell the others from it."""
+    strapped = {one.strap.course for one in straps.reduced}
+    is_known = job.diameter_is is not None or job.circumference_m is not None
+    if job.lines is None or len(strapped) > 1 or is_known:
+        return
+    text = message(
+        "size_told_by_one_course",
+        "blank, and nothing but the straps of course {course!r} tells how large the tank is: one"
+        " that lies over a manhole would not show; strap another course, or say what the nominal"
+        " diameter is on the drawing",
+        course=strapped.pop(),
+    )
+    yield Problem("job.toml", text, column="checks.diameter_is")
 
 
 def _uncontrolled(job, wall):

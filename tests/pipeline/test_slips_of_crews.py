@@ -130,6 +130,18 @@ def test_a_constant_in_all_distances_is_told_by_the_drawing(tmp_path, kind, tabl
     assert "size_told_by_distances" not in told
 
 
+@pytest.mark.slow
+def test_a_manhole_under_the_only_strapped_course_is_asked_for(tmp_path):
+    """Nothing in the readings shows it, 4 to 6 U: the drawing, or a second course, is asked for."""
+    book = book_of("lines", 1002)
+    over_a_manhole(book)
+    _, told = computed(tmp_path / "asked", book)
+    assert "checks.diameter_is" in told["size_told_by_one_course"]
+    book.settings["checks.diameter_is"] = "inside"
+    _, told = computed(tmp_path / "drawn", book)
+    assert "size_told_by_one_course" not in told
+
+
 @pytest.mark.study
 @pytest.mark.parametrize("kind", BOOKS)
 def test_sound_books_are_quiet_and_within_u(tmp_path, kind, figure):

@@ -197,7 +197,7 @@ def test_u_of_tangents_on_generated_walls_study(tmp_path, figure):
     figure("U of jobs by tangents, by undecided columns, largest", np.round(np.max(widened), 4))
     assert 0.6 < middle < 1.1  # these walls have less seams than are assumed before a survey
     np.testing.assert_allclose(same, 1, atol=0.03)
-    assert np.mean(np.array(widened) > 1.02) < 0.1
+    assert np.mean(np.array(widened) > 1.02) <= 0.1
 
 
 @pytest.mark.study

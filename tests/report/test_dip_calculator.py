@@ -1,6 +1,6 @@
 """The dip calculator, typed into and recalculated by LibreOffice: the table, as the record has it.
 
-The tank is the shipped example with rows 0.2 m apart; with all its rows as a study.
+The tank is the shipped example with rows 0.2 m apart; 0.05 m, or with all its rows, as a study.
 """
 
 import random
@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from calculated_tanks import example_with_rows
 from calculator_deliveries import held_against_deliveries
+from draws import draws
 from recalculation import calculators
 
 from tankcal.text.words import load_words
@@ -48,7 +49,7 @@ REFUSED_DIPS = {
     "blank": (lambda h: None, "type a dip in metres."),
 }
 
-STEPS_M = [0.2, pytest.param(0.01, marks=pytest.mark.study)]
+STEPS_M = [0.2, pytest.param(draws(0.05, 0.01), marks=pytest.mark.study)]
 
 
 @pytest.fixture(scope="module", params=STEPS_M)

@@ -69,11 +69,11 @@ def w_of_blunders(what, blunders, seed=1):
 def test_baarda_power_at_full_size(what, figure):
     """Closed form at the minimal detectable bias (0.1 %, 80 %): |w| is normal about 4.13, sd one.
 
-    The part that is found is known to 1.3 % by 1000 blunders, to 0.8 % by 2500 (2.5 standard errors
+    The part that is found is known to 1.8 % by 500 blunders, to 0.8 % by 2500 (2.5 standard errors
     of these, 2 %, was the band of the part); the mean and the sd of w say more: 2.5 of their
     standard errors are 0.08 and 0.056, and 0.08 is 2.2 % of what is found.
     """
-    blunders = draws(1000, 2500)
+    blunders = draws(500, 2500)
     w = w_of_blunders(what, blunders)
     found = np.mean(w > CRITICAL)
     figure(f"{blunders} blunders of the minimal detectable size, {what}: found", f"{found:.4f}")

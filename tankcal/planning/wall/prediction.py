@@ -31,7 +31,7 @@ from tankcal.planning.wall.telling import told_of_plan
 from tankcal.quadrature import panels
 
 OF_READINGS = (  # warnings that only true readings can give, or a drawing, which no plan knows
-    "size_told_by_distances",
+    *("size_told_by_distances", "size_told_by_one_course"),
     *("reading_copied", "line_copied", "no_control_readings"),
     *("repeats_apart", "strap_apart", "strapped_course_apart", "courses_exchanged"),
 )
