@@ -86,6 +86,7 @@ def test_t_is_that_of_another_program():
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 @pytest.mark.parametrize("alpha", [0.05, 0.2])
 def test_good_products_are_rejected_at_the_nominal_rate(alpha, figure):
     trials = 2000

@@ -130,6 +130,7 @@ def covered(trials, kind, seed):
 
 
 @pytest.mark.slow(after=1)
+@pytest.mark.twentieth
 @pytest.mark.parametrize("kind", ["affine", "similarity"])
 def test_coverage_of_a_transformed_coordinate(kind, figure):
     """Simulation: 95 % of the errors lie within 1.96 sd, chi2 averages its degrees of freedom."""

@@ -180,6 +180,7 @@ def weighed(seeds, figure):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 def test_the_outer_iteration_with_noise(figure):
     """Simulation: the bias is gone, whatever the noise."""
     found = weighed(range(2), figure)

@@ -124,6 +124,7 @@ def test_some_spoilt_files(sound, kind, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 @pytest.mark.parametrize("kind", SLOW)
 def test_hundreds_of_spoilt_files(sound, kind, tmp_path):
     spoil_and_read(kind, sound[kind], tmp_path, SLOW)

@@ -268,6 +268,7 @@ def assert_told(tmp_path, seeds):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 def test_spoilt_field_books_are_told(tmp_path):
     assert_told(tmp_path, range(FEW))
 

@@ -144,6 +144,7 @@ def coverage(tanks):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 def test_a_smoothed_area_is_covered_by_its_uncertainty(figure):
     """Simulation, 95 % within 3 binomial standard errors of 200 tanks."""
     part = coverage(200)

@@ -474,6 +474,7 @@ def check_coverage(simulate, count, figure):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 @pytest.mark.parametrize("simulate", SIMULATIONS[:3])
 def test_coverage_of_the_sds_a_twentieth(simulate, figure):
     check_coverage(simulate, 100, figure)

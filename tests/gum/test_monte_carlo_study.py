@@ -129,6 +129,7 @@ def ratios_over_seeds(rows, seeds, kinds, figure):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 def test_a_table_is_no_worse_than_a_million_plain_draws(figure):
     """u and both ends of every row, over seeds; a twentieth of the rows."""
     assert np.all(ratios_over_seeds(475, 6, MIXED, figure) <= 1)

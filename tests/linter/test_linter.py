@@ -257,6 +257,7 @@ def show(figure, counts, title):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 def test_mistakes_found_in_spoilt_tables(tmp_path, figure):
     """One twentieth of the study, of its own seed: nearly everything must be found and located."""
     counts = study(tmp_path, 60, seed=2, steps=("cm", "dm"))

@@ -375,6 +375,7 @@ def check_surveys(job, count, figure):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 def test_surveys_scatter_as_one_of_them_says(job, figure):
     check_surveys(job, 20, figure)
 

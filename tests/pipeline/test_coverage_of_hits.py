@@ -38,6 +38,7 @@ def found_of(rng, family, rings, folder, straps=False):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 @pytest.mark.parametrize("straps", [False, True])
 def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure, straps):
     of = partial(found_of, straps=straps)

@@ -61,6 +61,7 @@ def test_where_untied_set_ups_stood_is_no_part_of_an_outline(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 @pytest.mark.parametrize("method", JOBS)
 def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure, method):
     parts, _, _ = study(1, tmp_path, figure, found_of=partial(found_of, method=method))

@@ -62,6 +62,7 @@ def found_of(rng, family, straps, folder):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure):
     parts, _, _ = study(1, tmp_path, figure, rings=(2,), found_of=found_of)
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / 5)

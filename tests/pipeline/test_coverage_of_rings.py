@@ -60,6 +60,7 @@ def study(count, base, figure, shares=(0.2, 0.8)):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 def test_intervals_hold_on_rings_that_are_not_the_model(base_job, figure):
     held, _ = study(25, base_job, figure)
     assert held.min() > 0.94 - 3 * np.sqrt(0.95 * 0.05 / 25)

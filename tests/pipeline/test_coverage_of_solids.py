@@ -85,6 +85,7 @@ def _two(held):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 @pytest.mark.parametrize("kind", ["lying", "sphere"])
 def test_intervals_hold_on_solids_that_are_not_the_model(kind, tmp_path, figure):
     """A tenth of the study."""

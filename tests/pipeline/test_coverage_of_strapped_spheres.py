@@ -61,6 +61,7 @@ def study(balls, figure, seed):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 def test_intervals_hold_on_strapped_spheres(figure):
     held = study(8, figure, 5)
     least = LEAST_HELD - 3 * np.sqrt(0.95 * 0.05 / len(held))

@@ -94,6 +94,7 @@ def least_in_class(walls, classes):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure):
     """A twentieth of the study."""
     parts, _, _ = study(1, tmp_path, figure)

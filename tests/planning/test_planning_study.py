@@ -31,6 +31,7 @@ def test_hundreds_of_surveys_scatter_as_predicted(prediction, figure):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 def test_some_surveys_scatter_as_predicted(prediction, figure):
     """The study at a twentieth. Of 25 surveys the sd of one coordinate is known to 14 %; of 411
     that hang together the rms to a few per cent."""

@@ -215,6 +215,7 @@ def test_a_thing_that_takes_room_is_preferred():
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 @pytest.mark.parametrize("seed", range(6))
 def test_simulated_tables(seed):
     _check_drawn(seed)

@@ -176,6 +176,7 @@ def test_intervals_cover_at_full_size(name, figure):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 @pytest.mark.parametrize("name", NAMES)
 def test_intervals_cover(name, figure):
     done = study(name, 50)

@@ -108,6 +108,7 @@ def judge(figure, count, declared, tolerance):
 
 
 @pytest.mark.slow
+@pytest.mark.twentieth
 def test_the_uncertainty_of_simulated_bottoms_holds(figure):
     judge(figure, 72, declared=True, tolerance=7)
 
