@@ -10,8 +10,9 @@ from tankcal.inspection.settlement_limits import Strength
 from tankcal.inspection.shape import Sizes
 from tankcal.job import load
 from tankcal.messages import message
+from tankcal.pipeline.surveyed_wall import Wall
 from tankcal.pipeline.surveying import find_survey, placed
-from tankcal.pipeline.wall import Wall, warnings_of
+from tankcal.pipeline.wall import warnings_of
 from tankcal.record.making import JobAsRead
 from tankcal.record.plain_data import to_plain
 from tankcal.record.schema import filled_from

@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from tankcal.pipeline.ship import ShipTables
     from tankcal.pipeline.strapped_sphere import StrappedSphere
     from tankcal.pipeline.strapped_wall import StrappedWall
-    from tankcal.pipeline.wall import Wall
+    from tankcal.pipeline.surveyed_wall import Wall
     from tankcal.pipeline.wall_straps import Straps
     from tankcal.survey import Adjustment
     from tankcal.survey.sighting import Sighting

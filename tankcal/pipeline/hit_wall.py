@@ -10,7 +10,8 @@ from tankcal.job.checks.hits import offset_unknown
 from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import told_causes
 from tankcal.pipeline.misread_hits import refuse_other_units
-from tankcal.pipeline.wall import find_wall, joints_of, s_transform
+from tankcal.pipeline.point_covariance import s_transform
+from tankcal.pipeline.wall import find_wall, joints_of
 from tankcal.sections import coordinates_of
 from tankcal.survey import wall_points
 from tankcal.survey.poses import covariance_with_points, poses_of

@@ -15,8 +15,9 @@ from tankcal.job.tables import in_book
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
 from tankcal.pipeline.overruled_points import refuse_kept_readings, with_decided_readings
+from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.survey_warnings import refuse_undetermined
-from tankcal.pipeline.wall import find_wall, s_transform
+from tankcal.pipeline.wall import find_wall
 
 if TYPE_CHECKING:
     from tankcal.pipeline.cloud_wall import Clouded

@@ -17,7 +17,8 @@ from tankcal.pipeline.misread_tangents import (
     refuse_misread,
     refuse_misread_zeniths,
 )
-from tankcal.pipeline.wall import find_wall, s_transform
+from tankcal.pipeline.point_covariance import s_transform
+from tankcal.pipeline.wall import find_wall
 from tankcal.survey.poses import poses_in_network
 from tankcal.survey.sighting import WALL
 from tankcal.survey.tangents import touch

@@ -1,6 +1,6 @@
 """From surveyed points to the wall: told from clutter, its axis, covariance, field and sections."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse
@@ -12,10 +12,10 @@ from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.outlines import FULL_TURN, polar
-from tankcal.geometry.shell import WIDE_BAND, Shell, course_of, find_shell
+from tankcal.geometry.shell import WIDE_BAND, course_of, find_shell
 from tankcal.messages import message
 from tankcal.pipeline.overruled_points import decisions_of, refuse_kept
-from tankcal.pipeline.read_wall import ReadWall
+from tankcal.pipeline.point_covariance import given_covariance, median_sd, radial_sds
 from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.survey_warnings import (
     ADVISED_POINTS,
@@ -27,18 +27,14 @@ from tankcal.pipeline.survey_warnings import (
     warn_of_vague_vertical,
     weak_sections,
 )
-from tankcal.pipeline.undecided_columns import factors_of_undecided, undecided_halves
+from tankcal.pipeline.surveyed_wall import Wall
+from tankcal.pipeline.undecided_columns import undecided_halves
 from tankcal.pipeline.untied_setups import unbound_of
 from tankcal.pipeline.wall_readings import (
-    factors_of_plates,
-    factors_of_readings,
-    inputs_read_with,
-    names_of,
     noise_by_inputs,
 )
-from tankcal.pipeline.wall_straps import PointsOfWall, Straps, join_readings, told_courses
+from tankcal.pipeline.wall_straps import PointsOfWall, join_readings, told_courses
 from tankcal.sections import (
-    Section,
     coordinates_of,
     covariance_of,
     fit_section,
@@ -48,108 +44,6 @@ from tankcal.sections import (
     sample_of,
 )
 from tankcal.solver.threads import threads_for
-from tankcal.tank.factors import survey_factors
-
-
-@dataclass(frozen=True)
-class Wall:
-    """The wall of a tank as surveyed.
-
-    Attributes
-    ----------
-    shell : Shell
-        Axis, tilt, and what became of every point.
-    joints_m : ndarray, shape (courses + 1,)
-        Heights of the joints above the bottom, along the vertical, m.
-    accepted : ndarray, shape (m,)
-        Indices of the accepted points in job.points.
-    covariance_m2 : ndarray or sparse array, shape (3 m, 3 m)
-        Of the accepted points, m2.
-    noise_dof : float
-        Degrees of freedom of that covariance's scale.
-    field : WallField
-        The wall itself, between the points too: what the table is made of.
-    radii_by_points : sparse array, shape (n, 3 m)
-        Derivative of the field's readings, in their order, by x, y, z of the accepted points.
-    undecided_m : ndarray, shape (n, columns)
-        By how much the field's readings were moved towards the wall without each column of points
-        that may be of a fitting: half of what they depart from it.
-    sections : tuple of Section
-        Circles and outlines through the points, from the bottom up.
-    straps : Straps or None
-        Circumferences by tape that are among the readings, after the points.
-    read : ReadWall or None
-        What of the readings names no point: straps and offsets from reference lines.
-    by_inputs : dict
-        {input of the budget: (n,) derivative of the field's readings}, of what points depend on.
-    without_inputs : tuple of str
-        Inputs that have no meaning for these points.
-    origins_m : ndarray, shape (sections, 2)
-        x and y that the radii of each section were taken about, in the frame of the points: the
-        field's centres count from there.
-    """
-
-    shell: Shell
-    joints_m: np.ndarray
-    accepted: np.ndarray
-    covariance_m2: object
-    noise_dof: float
-    field: WallField
-    radii_by_points: scipy.sparse.csr_array
-    undecided_m: np.ndarray
-    sections: tuple[Section, ...]
-    straps: Straps | None = None
-    read: ReadWall | None = None
-    by_inputs: dict = field(default_factory=dict)
-    without_inputs: tuple = ()
-    origins_m: np.ndarray | None = None
-    surveyed_as = "wall"
-
-    def lowest_outline(self, azimuth_rad):
-        """(x, y) of the axis at the bottom, and (n,) radii of the lowest section, m."""
-        outline, height = self.sections[0].outline, self.sections[0].group.height_m
-        x, y = np.array([outline.x_m, outline.y_m]) - height * np.array(self.shell.slope)
-        return x, y, outline.radius_m(azimuth_rad)
-
-    def factors(self, job, weights):
-        """`Factor`s of what the points leave uncertain about features, (f, m) by the readings."""
-        by_points, causes = self.radii_by_points, job.points.causes
-        if scipy.sparse.issparse(self.covariance_m2):  # of many points: sums over each reading's
-            of_readings = by_points @ self.covariance_m2 @ by_points.T
-            covariance = weights @ (of_readings @ weights.T)
-        else:
-            jacobian = weights @ by_points
-            covariance = jacobian @ (self.covariance_m2 @ jacobian.T)
-        index = coordinates_of(self.accepted)
-        effects = [weights @ (by_points @ cause.column_m[index]) for cause in causes]
-        found = survey_factors(covariance, self.noise_dof, causes, effects)
-        found = (*found, *factors_of_undecided(weights @ self.undecided_m))
-        if self.read is None:
-            return found
-        outside = job.survey.side == "outside"  # a reading sees a plate that is not taken off it
-        taken = [one.by_inputs.get("plate_thickness", 0.0) for one in self.readings]
-        sees = np.append(np.full(self._points, outside), outside - np.array(taken))
-        gauged = {} if self.straps is None else self.straps.plate_sd_m
-        plates = factors_of_plates(names_of(job.courses), self.field, weights * sees, gauged)
-        return (*found, *factors_of_readings(self.readings, weights[:, self._points :]), *plates)
-
-    def read_with(self, weights):
-        """{input: (f,) derivative of features}: plates that points on the other side were moved
-        through; the temperature that a tape has of the shell, plates that points inside do not see.
-        """
-        found = inputs_read_with(self.readings, weights[:, self._points :])
-        for name, column in self.by_inputs.items():
-            found[name] = found.get(name, 0.0) + weights @ column
-        return found
-
-    @property
-    def readings(self):
-        """Readings of the field that name no point, and were accepted."""
-        return [] if self.read is None else self.read.accepted
-
-    @property
-    def _points(self):
-        return len(self.field.radius_m) - len(self.readings)
 
 
 def find_wall(job, progress, dof=np.inf, amplitudes=None):
@@ -224,9 +118,9 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     joints = joints_of(job) / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(angle)
     groups = _groups(job, shell, accepted, joints)
     sds, estimated = radial_sds(job.points), noise_is_estimated(job)
-    covariance = _given_covariance(job.points, accepted)
+    covariance = given_covariance(job.points, accepted)
     if estimated:  # what is given counts in relation; about as large as the points scatter
-        covariance = covariance * (shell.noise_m / _median_sd(sds)) ** 2
+        covariance = covariance * (shell.noise_m / median_sd(sds)) ** 2
     to_fit = _to_fit(job, shell, accepted, groups, covariance)
     nominal = job.tank.nominal_diameter_m / 2
     samples = [sample_of(*one) for one in to_fit]
@@ -488,118 +382,6 @@ def _azimuths(job, shell, wall):
     xyz = job.points.xyz_m[wall]
     axis = np.array(shell.axis_m) + np.outer(xyz[:, 2] - shell.z_m, shell.slope)
     return polar(xyz[:, :2] - axis, 0.0, 0.0)[0]
-
-
-def s_transform(points):
-    """Adjusted points with the covariance that they have among themselves.
-
-        C' = S C S + s2 D D',   S = I - D D'
-
-    D is an orthonormal basis of their common shift and their turn about the vertical, s2 the mean
-    variance that is left. No volume depends on these four, but a datum that holds one photo or one
-    point gives them whatever variance it has: sections fitted with it would depend on that choice.
-
-    Parameters
-    ----------
-    points : Points
-        n points with covariance_m2 (3n, 3n), m2.
-
-    Returns
-    -------
-    Points
-        With C', and with the columns of their causes projected by S.
-    """
-    basis, given = common_motions(points.xyz_m), points.covariance_m2
-    across = s_transform_factors(basis, given @ basis, np.trace(given))
-    change = np.hstack([basis, across]) @ np.hstack([across, basis]).T
-    causes = tuple(
-        replace(cause, column_m=cause.column_m - basis @ (basis.T @ cause.column_m))
-        for cause in points.causes
-    )
-    return replace(points, covariance_m2=np.subtract(given, change, out=change), causes=causes)
-
-
-def common_motions(xyz_m):
-    """Orthonormal basis of the shifts of points and their turn about the vertical.
-
-    Parameters
-    ----------
-    xyz_m : ndarray, shape (n, 3)
-        Coordinates, m.
-
-    Returns
-    -------
-    ndarray, shape (3 n, 4)
-        Orthonormal columns, in the order x, y, z of each point.
-
-    Examples
-    --------
-    >>> basis = common_motions(np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 1]]))
-    >>> bool(np.allclose(basis.T @ basis, np.eye(4)))
-    True
-    """
-    x, y, _ = (xyz_m - xyz_m.mean(axis=0)).T
-    motions = np.zeros((len(x), 3, 4))
-    motions[:, :, :3] = np.eye(3)
-    motions[:, 0, 3], motions[:, 1, 3] = -y, x
-    return np.linalg.qr(motions.reshape(-1, 4))[0]
-
-
-def s_transform_factors(basis, spread, trace):
-    """A of C' = C - D A' - A D', the covariance of `s_transform`, without forming S C S.
-
-        A = C D - D (D'C D + s2 I) / 2
-
-    Parameters
-    ----------
-    basis : ndarray, shape (3 n, 4)
-        D, of `common_motions`.
-    spread : ndarray, shape (3 n, 4)
-        C D, m2.
-    trace : float
-        Of C, m2.
-
-    Returns
-    -------
-    ndarray, shape (3 n, 4)
-        A, m2.
-
-    Examples
-    --------
-    >>> basis = common_motions(np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 1]]))
-    >>> a = s_transform_factors(basis, basis, trace=9.0)  # of C = I nothing changes
-    >>> bool(np.allclose(a, 0))
-    True
-    """
-    across = spread - 0.5 * basis @ (basis.T @ spread)
-    left = trace - 2 * np.sum(basis * across)
-    return across - 0.5 * max(left, 0.0) / (len(basis) - 4) * basis
-
-
-def radial_sds(points):
-    """(n,) standard deviations of the points in plan, or None when the file gives none."""
-    if points.covariance_m2 is not None:
-        variances = points.covariance_m2.diagonal().reshape(-1, 3)
-    elif points.sd_m is not None:
-        variances = points.sd_m**2
-    else:
-        return None
-    return np.sqrt(variances[:, :2].mean(axis=1))
-
-
-def _median_sd(sds):
-    """Median standard deviation of the points in plan; one metre when the file gives none."""
-    return 1.0 if sds is None else float(np.median(sds))
-
-
-def _given_covariance(points, wall):
-    """(3m, 3m) as in the file; one metre for every coordinate when the file gives none."""
-    if points.covariance_m2 is not None:
-        index = coordinates_of(wall)
-        return points.covariance_m2[np.ix_(index, index)]
-    if points.sd_m is not None:
-        return scipy.sparse.diags_array(points.sd_m[wall].ravel() ** 2).tocsr()
-    return scipy.sparse.eye_array(3 * len(wall), format="csr")
 
 
 def _to_fit(job, shell, accepted, groups, covariance):

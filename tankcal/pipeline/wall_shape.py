@@ -16,7 +16,7 @@ import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.shape_figures import Figures, Level, ShapeBase
-from tankcal.pipeline.wall import Wall
+from tankcal.pipeline.surveyed_wall import Wall
 
 LOW_M = 0.3048  # a foot above the bottom weld, where the low radii are judged
 SAME_LEVEL_M = 0.05  # a level as near as that to another is the same

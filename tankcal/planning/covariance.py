@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse
 
-from tankcal.pipeline.wall import common_motions, s_transform_factors
+from tankcal.pipeline.point_covariance import common_motions, s_transform_factors
 from tankcal.solver.effects import covariances
 
 

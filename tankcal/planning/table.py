@@ -10,9 +10,10 @@ from tankcal.job.model import Job
 from tankcal.messages import message
 from tankcal.pipeline.statements import statements
 from tankcal.pipeline.survey_warnings import refuse_undetermined
+from tankcal.pipeline.surveyed_wall import Wall
 from tankcal.pipeline.table import ComputedTable, compute_table
 from tankcal.pipeline.tanks.vertical import volume_by_points
-from tankcal.pipeline.wall import Wall, find_wall
+from tankcal.pipeline.wall import find_wall
 from tankcal.planning.covariance import PredictedCovariance
 from tankcal.survey.causes import causes_of
 from tankcal.survey.points import Points

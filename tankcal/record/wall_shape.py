@@ -77,7 +77,7 @@ def shape_record(job, wall):
     ----------
     job : Job
         As it was computed.
-    wall : pipeline.wall.Wall or None
+    wall : pipeline.surveyed_wall.Wall or None
     """
     shape = wall_shape_of(job, wall)
     if shape is None:

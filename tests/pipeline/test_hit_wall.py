@@ -214,7 +214,7 @@ def test_hits_after_the_network_are_named_points_in_it(tmp_path, beside):
     assert len(points.names) == count
     names = hits.job.points.names
     assert names == found.names
-    from tankcal.pipeline.wall import s_transform
+    from tankcal.pipeline.point_covariance import s_transform
 
     one, other = s_transform(found), s_transform(points)
     left, right = (p.xyz_m - p.xyz_m.mean(axis=0) for p in (one, other))

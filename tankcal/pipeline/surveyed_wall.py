@@ -1,0 +1,121 @@
+"""The wall of a tank that points show, with straps and lines beside them."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse
+
+from tankcal.geometry.field.estimate import WallField
+from tankcal.geometry.shell import Shell
+from tankcal.pipeline.read_wall import ReadWall
+from tankcal.pipeline.undecided_columns import factors_of_undecided
+from tankcal.pipeline.wall_readings import (
+    factors_of_plates,
+    factors_of_readings,
+    inputs_read_with,
+    names_of,
+)
+from tankcal.pipeline.wall_straps import Straps
+from tankcal.sections import Section, coordinates_of
+from tankcal.tank.factors import survey_factors
+
+
+@dataclass(frozen=True)
+class Wall:
+    """The wall of a tank as surveyed.
+
+    Attributes
+    ----------
+    shell : Shell
+        Axis, tilt, and what became of every point.
+    joints_m : ndarray, shape (courses + 1,)
+        Heights of the joints above the bottom, along the vertical, m.
+    accepted : ndarray, shape (m,)
+        Indices of the accepted points in job.points.
+    covariance_m2 : ndarray or sparse array, shape (3 m, 3 m)
+        Of the accepted points, m2.
+    noise_dof : float
+        Degrees of freedom of that covariance's scale.
+    field : WallField
+        The wall itself, between the points too: what the table is made of.
+    radii_by_points : sparse array, shape (n, 3 m)
+        Derivative of the field's readings, in their order, by x, y, z of the accepted points.
+    undecided_m : ndarray, shape (n, columns)
+        By how much the field's readings were moved towards the wall without each column of points
+        that may be of a fitting: half of what they depart from it.
+    sections : tuple of Section
+        Circles and outlines through the points, from the bottom up.
+    straps : Straps or None
+        Circumferences by tape that are among the readings, after the points.
+    read : ReadWall or None
+        What of the readings names no point: straps and offsets from reference lines.
+    by_inputs : dict
+        {input of the budget: (n,) derivative of the field's readings}, of what points depend on.
+    without_inputs : tuple of str
+        Inputs that have no meaning for these points.
+    origins_m : ndarray, shape (sections, 2)
+        x and y that the radii of each section were taken about, in the frame of the points: the
+        field's centres count from there.
+    """
+
+    shell: Shell
+    joints_m: np.ndarray
+    accepted: np.ndarray
+    covariance_m2: object
+    noise_dof: float
+    field: WallField
+    radii_by_points: scipy.sparse.csr_array
+    undecided_m: np.ndarray
+    sections: tuple[Section, ...]
+    straps: Straps | None = None
+    read: ReadWall | None = None
+    by_inputs: dict = field(default_factory=dict)
+    without_inputs: tuple = ()
+    origins_m: np.ndarray | None = None
+    surveyed_as = "wall"
+
+    def lowest_outline(self, azimuth_rad):
+        """(x, y) of the axis at the bottom, and (n,) radii of the lowest section, m."""
+        outline, height = self.sections[0].outline, self.sections[0].group.height_m
+        x, y = np.array([outline.x_m, outline.y_m]) - height * np.array(self.shell.slope)
+        return x, y, outline.radius_m(azimuth_rad)
+
+    def factors(self, job, weights):
+        """`Factor`s of what the points leave uncertain about features, (f, m) by the readings."""
+        by_points, causes = self.radii_by_points, job.points.causes
+        if scipy.sparse.issparse(self.covariance_m2):  # of many points: sums over each reading's
+            of_readings = by_points @ self.covariance_m2 @ by_points.T
+            covariance = weights @ (of_readings @ weights.T)
+        else:
+            jacobian = weights @ by_points
+            covariance = jacobian @ (self.covariance_m2 @ jacobian.T)
+        index = coordinates_of(self.accepted)
+        effects = [weights @ (by_points @ cause.column_m[index]) for cause in causes]
+        found = survey_factors(covariance, self.noise_dof, causes, effects)
+        found = (*found, *factors_of_undecided(weights @ self.undecided_m))
+        if self.read is None:
+            return found
+        outside = job.survey.side == "outside"  # a reading sees a plate that is not taken off it
+        taken = [one.by_inputs.get("plate_thickness", 0.0) for one in self.readings]
+        sees = np.append(np.full(self._points, outside), outside - np.array(taken))
+        gauged = {} if self.straps is None else self.straps.plate_sd_m
+        plates = factors_of_plates(names_of(job.courses), self.field, weights * sees, gauged)
+        return (*found, *factors_of_readings(self.readings, weights[:, self._points :]), *plates)
+
+    def read_with(self, weights):
+        """{input: (f,) derivative of features}: plates that points on the other side were moved
+        through; the temperature that a tape has of the shell, plates that points inside do not see.
+        """
+        found = inputs_read_with(self.readings, weights[:, self._points :])
+        for name, column in self.by_inputs.items():
+            found[name] = found.get(name, 0.0) + weights @ column
+        return found
+
+    @property
+    def readings(self):
+        """Readings of the field that name no point, and were accepted."""
+        return [] if self.read is None else self.read.accepted
+
+    @property
+    def _points(self):
+        return len(self.field.radius_m) - len(self.readings)
