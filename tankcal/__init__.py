@@ -23,7 +23,8 @@ if TYPE_CHECKING:  # what a type checker reads; nothing of it runs
     from tankcal.errors import HeightError, InputError, SolutionError, TankcalError
     from tankcal.job import Job, load
     from tankcal.linter import lint
-    from tankcal.pipeline.chain import Result, adjust_job, run
+    from tankcal.pipeline.chain import adjust_job, run
+    from tankcal.pipeline.result import Result
     from tankcal.pipeline.views import plot
     from tankcal.report.outputs import write
     from tankcal.survey import Adjustment
@@ -35,7 +36,7 @@ _ROOM_OF = {
     "Job": "job",
     "run": "pipeline.chain",
     "adjust_job": "pipeline.chain",
-    "Result": "pipeline.chain",
+    "Result": "pipeline.result",
     "Adjustment": "survey",
     "plot": "pipeline.views",
     "write": "report.outputs",

@@ -26,7 +26,7 @@ def gaps_of_result(result, limits_mm, reading=None, progress=None):
 
     Parameters
     ----------
-    result : tankcal.pipeline.chain.Result
+    result : tankcal.pipeline.result.Result
         Of an upright tank; its files of clouds are read once more.
     limits_mm : dict
         {"peaking": mm, "banding": mm} of the rule; one that is left out is not known.

@@ -154,7 +154,7 @@ _OF_A_SURVEY = ("points", "choices", "warnings", "adjustment")
 
 
 def record_of(result):
-    """The record of a `chain.Result`: a dict of plain numbers, texts and lists."""
+    """The record of a `result.Result`: a dict of plain numbers, texts and lists."""
     job, adjustment = result.job, result.adjustment
     return to_plain(
         Record(

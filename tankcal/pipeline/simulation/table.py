@@ -52,7 +52,7 @@ class TableSimulation:
 def simulate_table(job, survey, body, zero_m, table, pairs=(), *, goal=None, progress=None):
     """`TableSimulation` of a `Capacity`.
 
-    job, survey, body, zero_m  what the table was made of, as in `chain.Result`
+    job, survey, body, zero_m  what the table was made of, as in `result.Result`
     pairs   of dips whose deliveries are simulated as well
     goal    `monte_carlo.Goal`; the probability is the table's
     progress  called as progress(text, done, total)

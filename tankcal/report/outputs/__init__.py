@@ -19,7 +19,7 @@ from tankcal.report.outputs import tables
 from tankcal.text.languages import LANGUAGES
 
 if TYPE_CHECKING:
-    from tankcal.pipeline.chain import Result
+    from tankcal.pipeline.result import Result
     from tankcal.report.letterhead import Letterhead
 
 RECORD = "record.json"
