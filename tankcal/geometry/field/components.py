@@ -116,7 +116,7 @@ class Component:
 _FREE = (0, 0, *(order**-2.0 for order in range(2, 7)))
 _LINEAR = (0, 1)
 COMPONENTS = (
-    Component("common bulge", "bulge", "mean", True, "plate", 0.95e-3, 1.0, "barrel"),
+    Component("common bulge", "bulge", "mean", True, "plate", 1.05e-3, 1.0, "barrel"),
     Component("drawn-in joints", "bulge", "mean", True, "joints", 0.85e-3, 1.0, "barrel"),
     Component("own bulge", "bulge", "mean", False, _FREE, 0.62e-3, 1.0, "barrel"),
     Component("taper", "bulge", "mean", False, _LINEAR, 0.45e-3, 1.5, "taper"),
