@@ -124,7 +124,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     to_fit = _to_fit(job, shell, accepted, groups, covariance)
     nominal = job.tank.nominal_diameter_m / 2
     samples = [sample_of(*one) for one in to_fit]
-    sites, means = _sites(groups, samples, nominal, _welds(job), job.tangents is not None)
+    sites, means = _sites(groups, samples, nominal, _welds(job), is_smoothed(job))
     undecided = means @ undecided_halves(shell, accepted, groups)
     radius = means @ np.concatenate([one.radius_m for one in samples]) - undecided.sum(axis=1)
     noise = (means @ scipy.sparse.block_diag(_blocks(samples)) @ means.T).toarray()
@@ -187,6 +187,13 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     )
 
 
+def is_smoothed(job):
+    """Whether the readings show the wall smoother than it is: limbs pass over its valleys, set-ups
+    that nothing but the wall ties are fitted to what they see of it.
+    """
+    return job.tangents is not None or any(one.what == "pose" for one in job.points.unbound)
+
+
 def _sizes_of(shell):
     """Sizes near which those of the wall are looked for, the noise as a factor; None: not known."""
     if shell.sizes_m2 is None:
@@ -232,7 +239,7 @@ def _welds(job):
     return given if any(map(len, given)) else ()
 
 
-def _sites(groups, samples, nominal_m, welds_rad, limbs):
+def _sites(groups, samples, nominal_m, welds_rad, smoothed):
     """`Sites` of the field, and (sites, points) weights of the points in each: one, or a cell."""
     counts = [len(one.radius_m) for one in samples]
     sites = Sites(
@@ -242,7 +249,7 @@ def _sites(groups, samples, nominal_m, welds_rad, limbs):
         azimuth_rad=np.concatenate([one.azimuth_rad for one in samples]),
         leans=np.repeat([one.degree > 0 for one in groups], counts),
         welds_rad=welds_rad,
-        limbs=limbs,
+        smoothed=smoothed,
     )
     if len(sites) <= MOST_SITES:
         return sites, scipy.sparse.eye_array(len(sites), format="csr")

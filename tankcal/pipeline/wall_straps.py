@@ -333,5 +333,5 @@ def _joined(points, straps):
         **{name: np.concatenate([getattr(points, name), getattr(straps, name)]) for name in names},
         welds_rad=points.welds_rad,
         points=tuple(np.concatenate(pair) for pair in zip(points.seen, straps.seen, strict=True)),
-        limbs=points.limbs,
+        smoothed=points.smoothed,
     )

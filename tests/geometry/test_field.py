@@ -120,16 +120,16 @@ def test_a_rough_form_expects_more_of_the_bulge_that_one_ring_does_not_show():
 
 def test_limbs_tell_no_size_by_another():
     """Property: whatever form they show, what one ring does not show stays as it was before."""
-    sites, rng = replace(sites_of(4, [0.0], 36), limbs=True), np.random.default_rng(3)
-    before = assumed_amplitudes(limbs=True)
+    sites, rng = replace(sites_of(4, [0.0], 36), smoothed=True), np.random.default_rng(3)
+    before = assumed_amplitudes(smoothed=True)
     for rough_m in (0.0, 0.004):
         form = rough_m * rng.normal(size=36)
         radius = RADIUS_M + form[np.arange(len(sites)) % 36] + 1e-3 * rng.normal(size=len(sites))
         found = estimate_amplitudes(sites, radius, np.full(len(sites), 1e-6), RADIUS_M)
         assert found.variances_m2[:2] == pytest.approx(before.variances_m2[:2], rel=1e-3)
-    assert sites.take(sites.course > 0).limbs
-    assert sites_of_cells(sites, cells_of(sites, np.full(len(sites), 1e-6), RADIUS_M)).limbs
-    assert _joined(sites, replace(sites, limbs=False)).limbs
+    assert sites.take(sites.course > 0).smoothed
+    assert sites_of_cells(sites, cells_of(sites, np.full(len(sites), 1e-6), RADIUS_M)).smoothed
+    assert _joined(sites, replace(sites, smoothed=False)).smoothed
 
 
 def test_a_plate_bulges_between_a_parabola_and_a_bell():

@@ -16,7 +16,7 @@ from test_coverage_of_walls import judged, least_in_class, study
 
 from tankcal.pipeline.hit_wall import sight_wall
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall import find_wall, is_smoothed
 
 HITS = {1: 12, 2: 16, 3: 24}
 
@@ -34,6 +34,7 @@ def found_of(rng, family, rings, folder, straps=False):
         sd_m=np.exp(rng.uniform(*np.log([5e-4, 3e-3]))),
     )
     job, _ = sight_wall(job, None, lambda text: None)
+    assert not is_smoothed(job)  # its one set-up is the frame
     return judged(wall, body_of(job, find_wall(job, lambda text: None)), family, rings)
 
 

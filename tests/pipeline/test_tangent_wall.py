@@ -119,7 +119,7 @@ def test_noise_is_within_U(noisy):
 
 def test_the_field_knows_of_limbs(noisy):
     """So that no size of a component is told by another (`test_field`)."""
-    assert noisy.wall.field.sites.limbs
+    assert noisy.wall.field.sites.smoothed
 
 
 @pytest.mark.slow

@@ -35,7 +35,7 @@ from tankcal.planning.changes import changes_of
 from tankcal.planning.improvements import Effect
 from tankcal.planning.wall.changes import instruments_read, wall_changes_of
 from tankcal.planning.wall.foreseen_tables import tangent_sight
-from tankcal.planning.wall.model import PlannedStrap, even_radius_m, evenness_of_limbs
+from tankcal.planning.wall.model import PlannedHits, PlannedStrap, even_radius_m, evenness_of_limbs
 from tankcal.planning.wall.nominal_readings import with_nominal_readings
 from tankcal.planning.wall.prediction import foresee_table
 from tankcal.planning.wall.reading import changed, tables_of
@@ -56,11 +56,17 @@ def prediction(request):
     return predict(load_plan(request.param))
 
 
-def test_only_limbs_leave_sizes_that_tell_nothing_of_each_other(prediction):
+def test_limbs_and_untied_setups_leave_sizes_that_tell_nothing_of_each_other(prediction):
     """As of the jobs, so that a plan foretells their U."""
     plan, covariance = prediction.plan, prediction.plan.amplitudes.log_covariance
     apart = np.all(covariance == np.diag(np.diag(covariance)))
-    assert apart == (plan.design.tangents is not None)
+    design, ring = (
+        plan.design,
+        PlannedHits(setups=3, radius_m=1.0, hits=8, at_percent=(50,), courses=("1",)),
+    )
+    assert apart == (design.tangents is not None) == design.is_smoothed
+    assert replace(design, hits=(ring,), ties=None).is_smoothed
+    assert replace(design, hits=(ring,), ties=(3, 0.6, 3.0)).is_smoothed == apart
 
 
 @pytest.mark.slow
@@ -181,7 +187,7 @@ def test_u_of_tangents_on_generated_walls_study(tmp_path, figure):
             found, table, _ = table_of_limbs(job, *known)
             planned, amplitudes = (
                 seen_as_planned(job, known[0], found),
-                assumed_amplitudes(limbs=True),
+                assumed_amplitudes(smoothed=True),
             )
             first, _, _ = table_of_limbs(planned, *known, amplitudes)
             expected = expect_amplitudes(first.field)

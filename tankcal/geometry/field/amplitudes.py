@@ -60,7 +60,7 @@ class Amplitudes:
         return self.likely_m2 * np.exp(np.diag(self.log_covariance) / 2)
 
 
-def assumed_amplitudes(ovality_m=None, common_ovality_m=None, *, limbs=False):
+def assumed_amplitudes(ovality_m=None, common_ovality_m=None, *, smoothed=False):
     """`Amplitudes` of a wall that nobody measured yet: the medians, as wide as they are before.
 
     Parameters
@@ -68,15 +68,16 @@ def assumed_amplitudes(ovality_m=None, common_ovality_m=None, *, limbs=False):
     ovality_m, common_ovality_m : float, optional
         Departure from a circle (rms) of a course, and the part of it that runs up the whole shell,
         where they are known.
-    limbs : bool, optional
-        Whether lines of sight are to touch the wall; see `components.log_covariance`.
+    smoothed : bool, optional
+        Whether the readings will show the wall smoother than it is; see
+        `components.log_covariance`.
 
     Returns
     -------
     Amplitudes
     """
     size = np.array([one.median_m for one in COMPONENTS]) ** 2
-    covariance = log_covariance(limbs)
+    covariance = log_covariance(smoothed)
     before = np.sqrt(np.diag(covariance))
     if ovality_m is not None:
         common = min(common_ovality_m or 0.0, ovality_m)

@@ -81,5 +81,5 @@ def sites_of_cells(sites, weights):
         leans=sites.leans[first],
         welds_rad=sites.welds_rad,
         points=(sites.course, sites.azimuth_rad),
-        limbs=sites.limbs,
+        smoothed=sites.smoothed,
     )

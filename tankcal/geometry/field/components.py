@@ -131,16 +131,16 @@ COMPONENTS = (
 )
 
 
-def log_covariance(limbs=False):
+def log_covariance(smoothed=False):
     """(components, components) of the logarithms of the variances, before the survey.
 
     Plates that are badly rolled and fitted leave a shell that is rough in every way; what welds
-    draw in when they shrink is peaking at the vertical and banding at the girth ones. Limbs show
-    every wall smoother than it is, for they pass over its valleys: of those (limbs True) no size
-    tells of another.
+    draw in when they shrink is peaking at the vertical and banding at the girth ones. But limbs,
+    which pass over its valleys, and set-ups that nothing but the wall ties show every wall smoother
+    than it is: of those (smoothed True) no size tells of another.
     """
     log_sd = np.array([one.log_sd for one in COMPONENTS])
-    if limbs:
+    if smoothed:
         return np.diag(log_sd**2)
     welded = np.array([one.kind == "seams" or one.orders == "joints" for one in COMPONENTS])
     alike = WORKMANSHIP + SHRINKAGE * np.outer(welded, welded)

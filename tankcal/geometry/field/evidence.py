@@ -54,7 +54,9 @@ def likelihood_of(sites, radius_m, noise_m2, nominal_m, estimate_noise):
     shared, own = _shown(sites)
     own = own + missed + [len(COMPONENTS)] * estimate_noise
     variances = np.diag(noise_m2) if np.ndim(noise_m2) == 2 else noise_m2
-    prior = prior_of(COMPONENTS, log_covariance(sites.limbs), variances if estimate_noise else None)
+    prior = prior_of(
+        COMPONENTS, log_covariance(sites.smoothed), variances if estimate_noise else None
+    )
     return Likelihood(parts, np.array(own), np.array(shared), spread, wide, *prior)
 
 

@@ -32,8 +32,8 @@ class Sites:
         Derivative of the radii by unknowns that courses share: the constant of a plumb line.
     points : tuple of ndarray, shape (p,), optional
         Course and azimuth of the points that the sites are means of.
-    limbs : bool
-        Whether lines of sight touched the wall, which pass over its valleys.
+    smoothed : bool
+        Whether the readings show the wall smoother than it is; see `components.log_covariance`.
     """
 
     course: np.ndarray
@@ -44,7 +44,7 @@ class Sites:
     welds_rad: tuple = ()
     shared: np.ndarray | None = None
     points: tuple | None = None
-    limbs: bool = False
+    smoothed: bool = False
 
     def __len__(self):
         return len(self.course)
@@ -61,7 +61,7 @@ class Sites:
             welds_rad=tuple(self.welds_of(one) for one in seen) if self.welds_rad else (),
             shared=None if self.shared is None else self.shared[chosen],
             points=None if self.points is None else _of_courses(*self.points, seen),
-            limbs=self.limbs,
+            smoothed=self.smoothed,
         )
 
     @property

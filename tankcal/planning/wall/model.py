@@ -183,6 +183,12 @@ class Design:
         others = (self.straps, self.hits, self.lines, self.tangents)
         return bool(self.runs) and not any(others)
 
+    @property
+    def is_smoothed(self):
+        """Whether its readings show the wall smoother than it is: `pipeline.wall.is_smoothed`."""
+        untied = self.ties is None and sum(ring.setups for ring in self.hits) > 1
+        return self.tangents is not None or untied
+
 
 @dataclass(frozen=True)
 class WallPlan:

@@ -146,7 +146,7 @@ def wall_plan_of(raw, values, tables, given, limits, folder):
     sizes = (
         None if wall[key] is None else wall[key] / 1000 for key in ("form_mm", "common_form_mm")
     )
-    amplitudes = assumed_amplitudes(*sizes, limbs=design.tangents is not None)
+    amplitudes = assumed_amplitudes(*sizes, smoothed=design.is_smoothed)
     bottom, diameter = values["datum"]["bottom_z_m"], values["tank"]["nominal_diameter_m"]
     zero = 0.0 if bottom is None else zero_z(values) - bottom
     obstacles = () if bottom is None else obstacles_of(given)
