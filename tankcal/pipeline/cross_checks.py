@@ -120,6 +120,11 @@ def check_side(job, inside_m, plate_m, sd_m):
     return [] if text is None else [Problem("job.toml", text, column="checks.diameter_is")]
 
 
+def is_size_declared(job):
+    """Whether a drawing, or a circumference beside the survey, says how large the tank is."""
+    return job.diameter_is is not None or job.circumference_m is not None
+
+
 def _against_tape(job, wall):
     measured = job.circumference_m
     if measured is None:

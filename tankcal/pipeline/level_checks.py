@@ -5,6 +5,7 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.job.plausibility import DIAMETER_MISS, MIDDLE, OUTSIDE
 from tankcal.messages import list_some, message
+from tankcal.pipeline.cross_checks import is_size_declared
 from tankcal.pipeline.wall_straps import mean_radii
 
 SHOWN = 5  # names in a message
@@ -68,7 +69,7 @@ def check_size_told(job, instruments):
 
     instruments  their names
     """
-    if job.strapping is not None or job.circumference_m is not None or job.diameter_is is not None:
+    if job.strapping is not None or is_size_declared(job):
         return
     text = message(
         "size_told_by_distances",

@@ -10,7 +10,7 @@ from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.compared_courses import course_apart, exchanged_courses
-from tankcal.pipeline.cross_checks import check_side
+from tankcal.pipeline.cross_checks import check_side, is_size_declared
 from tankcal.pipeline.moved_setups import tested
 from tankcal.pipeline.survey_limits import limit_at
 from tankcal.pipeline.tape_checks import check_tapes
@@ -303,8 +303,7 @@ def _of_first_course(job, straps):
 def _of_one_course(job, straps):
     """A tank whose size the straps of one course alone tell: lines tell the others from it."""
     strapped = {one.strap.course for one in straps.reduced}
-    is_known = job.diameter_is is not None or job.circumference_m is not None
-    if job.lines is None or len(strapped) > 1 or is_known:
+    if job.lines is None or job.radii is not None or len(strapped) > 1 or is_size_declared(job):
         return
     text = message(
         "size_told_by_one_course",

@@ -30,9 +30,7 @@ from tankcal.pipeline.survey_warnings import (
 from tankcal.pipeline.surveyed_wall import Wall
 from tankcal.pipeline.undecided_columns import undecided_halves
 from tankcal.pipeline.untied_setups import unbound_of
-from tankcal.pipeline.wall_readings import (
-    noise_by_inputs,
-)
+from tankcal.pipeline.wall_readings import noise_by_inputs
 from tankcal.pipeline.wall_straps import PointsOfWall, join_readings, told_courses
 from tankcal.sections import (
     coordinates_of,

@@ -60,10 +60,8 @@ def test_limbs_and_untied_setups_leave_sizes_that_tell_nothing_of_each_other(pre
     """As of the jobs, so that a plan foretells their U."""
     plan, covariance = prediction.plan, prediction.plan.amplitudes.log_covariance
     apart = np.all(covariance == np.diag(np.diag(covariance)))
-    design, ring = (
-        plan.design,
-        PlannedHits(setups=3, radius_m=1.0, hits=8, at_percent=(50,), courses=("1",)),
-    )
+    design = plan.design
+    ring = PlannedHits(setups=3, radius_m=1.0, hits=8, at_percent=(50,), courses=("1",))
     assert apart == (design.tangents is not None) == design.is_smoothed
     assert replace(design, hits=(ring,), ties=None).is_smoothed
     assert replace(design, hits=(ring,), ties=(3, 0.6, 3.0)).is_smoothed == apart
@@ -180,7 +178,7 @@ def test_u_of_tangents_on_generated_walls_study(tmp_path, figure):
     """
     ratios, same, widened = [], [], []
     for family in ("coil", "brick", "dents", "buckle", "chord"):
-        for seed in range(draws(2, 6)):
+        for seed in range(draws(3, 6)):
             rng = np.random.default_rng(seed)
             wall = make_wall(rng, family, radius_m=7.5, courses=6)
             job, *known = tangent_job(rng, wall, folder=tmp_path / "limbs", stations=8)
@@ -203,7 +201,7 @@ def test_u_of_tangents_on_generated_walls_study(tmp_path, figure):
     figure("U of jobs by tangents, by undecided columns, largest", np.round(np.max(widened), 4))
     assert 0.6 < middle < 1.1  # these walls have less seams than are assumed before a survey
     np.testing.assert_allclose(same, 1, atol=0.03)
-    assert np.mean(np.array(widened) > 1.02) <= 0.1
+    assert np.mean(np.array(widened) > 1.02) < 0.1
 
 
 @pytest.mark.study
