@@ -238,6 +238,7 @@ def hits_book(tank, rng, setups=1):
                 book.tables["wall_hits"].append(
                     {"setup": f"E{i + 1}", "course": str(course + 1), **_sight(sight)}
                 )
+    book.tables["control_readings"] = list(_read_again(setups, *rng.spawn(1)))
     if setups > 1:
         targets = [(0.8 * radius, 0.3, 0.6), (0.8 * radius, 1.9, 2.2), (0.8 * radius, 3.4, 1.1),
                    (0.8 * radius, 5.2, 2.9)]  # fmt: skip
@@ -250,6 +251,17 @@ def hits_book(tank, rng, setups=1):
         ]
         _tie(book, stations - [0, 0, 1.6], sights, 3.0, 0.7)
     return book
+
+
+def _read_again(setups, rng):
+    """Rows of four control targets that each set-up reads three times."""
+    for i in range(setups):
+        for target in range(4):
+            for hour in (10, 11, 12):
+                off = rng.normal(size=3) * (5 * ARCSEC, 5 * ARCSEC, 6e-4)
+                sight = _sight((1.5 * target + off[0], 1.5 + off[1], 6 + off[2]))
+                yield {"setup": f"E{i + 1}", "target": f"K{target + 1}", **sight,
+                       "time": f"2026-01-05T{hour}:00"}  # fmt: skip
 
 
 def tangents_book(tank, rng, stations=8):

@@ -1,6 +1,7 @@
 """Warnings of bare wall hits: what a sound crew with a sound instrument hardly brings home."""
 
 import numpy as np
+from scipy.special import ndtri
 
 from tankcal.errors import Problem
 from tankcal.geometry.outlines import FULL_TURN
@@ -25,7 +26,8 @@ from tankcal.survey.control_drift import repeats_of
 from tankcal.survey.sighting import NETWORK
 
 RULES, CONTROL = "wall_hits", "control_readings.csv"
-UNLIKE_SDS = 3.0  # of an offset or a scale from its certificate, of an angle from its repeat
+UNLIKE_SDS = 3.0  # of an offset or a scale from its certificate
+BY_CHANCE = 0.01  # of sound surveys whose control targets seem to move by their readings' scatter
 OVER_JOINT_M = 0.02  # a hit of a course may lie so far beyond it
 SUSPECT = 3.0  # test quantity of the worst set-up, from which it is tested by all others
 WAVE_M = 3e-3  # sd of each long wave of a wall, when a set-up is tested
@@ -63,12 +65,16 @@ def _of_control(job):
         )
         yield Problem(CONTROL, text)
         return
-    for one in repeats_of(job.hits.control):
-        angle = max(limits["control_angle_gon"] * GON, _scatter_of(job.hits, one.setup))
+    again = repeats_of(job.hits.control)
+    factor = np.sqrt(2) * -ndtri(BY_CHANCE / 2 / sum(3 * len(one.rows) for one in again))
+    for one in again:
+        of_distances, of_angles = (factor * sd for sd in _sds_of(job.hits, one.setup))
+        angle = max(limits["control_angle_gon"] * GON, of_angles)
+        distance = max(limits["control_distance_mm"] / 1000, of_distances)
         for name, values, limit, per, unit in (
             ("direction", one.direction_rad, angle, GON / 1000, "mgon"),
             ("zenith", one.zenith_rad, angle, GON / 1000, "mgon"),
-            ("distance_m", one.distance_m, limits["control_distance_mm"] / 1000, 1e-3, "mm"),
+            ("distance_m", one.distance_m, distance, 1e-3, "mm"),
         ):
             size = np.nan_to_num(np.abs(values))
             worst = int(np.argmax(size))
@@ -86,10 +92,10 @@ def _of_control(job):
                 yield Problem(CONTROL, text, one.rows[worst], name)
 
 
-def _scatter_of(hits, setup):
-    """By how much two angles of a set-up differ at most by their standard deviation, rad."""
-    own = hits.sd_rad[np.array(hits.setup) == setup]
-    return UNLIKE_SDS * np.sqrt(2) * np.median(own) if len(own) else 0.0
+def _sds_of(hits, setup):
+    """Standard deviations of a distance (m) and of an angle (rad) of a set-up; 0 without hits."""
+    own = np.array(hits.setup) == setup
+    return [np.median(one[own]) if own.any() else 0.0 for one in (hits.sd_m, hits.sd_rad)]
 
 
 def _of_levels(job, wall):

@@ -7,6 +7,7 @@ from scipy.special import bdtrc, erf, pdtrc
 
 from tankcal.errors import Problem
 from tankcal.messages import message
+from tankcal.pipeline.survey_limits import limits_of
 
 FILE, TAPES = "circumferences.csv", "instruments.toml"
 FAHRENHEIT_K = 8.0  # from the shell's: so near a temperature in Fahrenheit is that of the shell
@@ -16,7 +17,6 @@ PULL = 2.0  # a pull so many times that of the certificate, or one part in so ma
 UNITS_N = {"kgf": 9.80665, "lbf": 4.4482216}
 THICKNESS_M = (5e-5, 1.2e-3)  # of tapes
 STIFFNESS_N = (1e5, 5e6)  # of tapes: 0.5 to 25 mm2 of steel
-LARGEST_CORRECTION = 5e-4
 BY_CHANCE = 0.02  # as many equal repeats, or more, so rarely come by chance
 
 
@@ -123,13 +123,14 @@ def _of_certificates(straps):
                 high=5e7 / STIFFNESS_N[0],
             )
             yield Problem(TAPES, text, column=f"{tape.name}.section_mm2")
-        if abs(tape.correction) > LARGEST_CORRECTION:
+        most_ppm = limits_of("strapping")["most_correction_ppm"]
+        if abs(tape.correction) > most_ppm / 1e6:
             text = message(
                 "tape_correction_strange",
-                "{found_ppm:+.0f} ppm; no sound tape is off by more than {most_ppm:.0f} ppm: it is"
-                " a number, not a percentage or millimetres",
+                "{found_ppm:+.0f} ppm; a tape that passed a verification is off by no more than"
+                " {most_ppm:.0f} ppm: is it that of another tape, a percentage, or in millimetres?",
                 found_ppm=1e6 * tape.correction,
-                most_ppm=1e6 * LARGEST_CORRECTION,
+                most_ppm=most_ppm,
             )
             yield Problem(TAPES, text, column=f"{tape.name}.correction")
 

@@ -706,11 +706,11 @@ def test_control_targets_that_moved_are_named(tmp_path):
         ["setup", "target", "direction_deg", "zenith_deg", "distance_m", "time"],
         first,
         ["I", "K", 10.0002, 80.0, 5.0015, "2026-01-05T10:30"],
-        ["I", "K", 10.0012, 80.0, 5.0015, "2026-01-05T10:40"],  # 4.3"
+        ["I", "K", 10.0012, 80.0, 5.0028, "2026-01-05T10:40"],  # 4.3", and 2 sd of a difference
     ]
     quiet = run(tmp_path, parts)
     assert not {file for file, _ in codes_of(quiet)} & {"control_readings.csv"}
-    parts.tables["control_readings"].append(["I", "K", 10.0082, 80.0, 5.003, "2026-01-05T11:00"])
+    parts.tables["control_readings"].append(["I", "K", 10.0082, 80.0, 5.006, "2026-01-05T11:00"])
     moved = codes_of(run(tmp_path, parts))
     assert ("control_readings.csv", "direction") in moved
     assert ("control_readings.csv", "distance_m") in moved

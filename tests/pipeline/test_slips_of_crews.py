@@ -20,6 +20,7 @@ from tankcal.record import record_of
 OF_SLIPS = {
     "strap_contradicts", "strapped_course_apart", "lines_turned_about", "hits_ranged_otherwise",
     "large_correction", "strip_upright", "weld_thick", "tangents_of_high_setup",
+    "tape_correction_strange", "control_moved",
 }  # fmt: skip
 SOUND = draws(8, 30)
 
@@ -65,6 +66,19 @@ def millimetres_a_metre(book):
     book.instruments["ET-5"]["correction"] = 1e-3
 
 
+def correction_of_another_tape(book):
+    book.instruments["T-88"]["correction"] += 3e-4
+
+
+def zenith_angles_drift(book):
+    """By two minutes of arc, from the first reading of control targets to the last."""
+    rows, again = book.tables["wall_hits"], book.tables["control_readings"]
+    drifts = [(row, place / len(rows)) for place, row in enumerate(rows)]
+    drifts += [(row, (int(row["time"][11:13]) - 10) / 2) for row in again]
+    for row, part in drifts:
+        row["zenith_deg"] = round(row["zenith_deg"] + 120 / 3600 * part, 4)
+
+
 def columns_of_welds_exchanged(book):
     for row in book.tables["obstructions"]:
         row["thickness_mm"], row["width_mm"] = row["width_mm"], row["thickness_mm"]
@@ -86,6 +100,8 @@ SLIPS = [
     ("three set-ups", constant_of_a_prism, "hits_ranged_otherwise"),
     ("three set-ups", millimetres_a_metre, "large_correction"),
     ("hits", millimetres_a_metre, "large_correction"),
+    ("hits", zenith_angles_drift, "control_moved"),
+    ("strapping", correction_of_another_tape, "tape_correction_strange"),
     ("strapping", columns_of_welds_exchanged, "strip_upright"),
     ("lines", plates_for_caps, "weld_thick"),
     ("tangents", height_of_one_instrument, "tangents_of_high_setup"),

@@ -18,7 +18,7 @@ CERTIFICATES = {  # keys of a tape that are in another unit or misread, and what
     "certified_temperature_strange": {"certified_temperature_c": 68.0},
     "tape_thickness_strange": {"thickness_mm": 2.0},
     "tape_stiffness_strange": {"section_mm2": 0.25},
-    "tape_correction_strange": {"correction": 0.0035},
+    "tape_correction_strange": {"correction": 335e-6},
     "pull_unlike_certificate": {"tension_n": 5.1},  # kgf
 }
 
@@ -28,6 +28,13 @@ def test_a_certificate_of_no_tape_is_named(tmp_path, code):
     parts = strapped_parts()
     parts.registers["instruments"]["T-12"] |= CERTIFICATES[code]
     assert code in told(parts, tmp_path)
+
+
+def test_a_correction_that_class_ii_allows_is_quiet(tmp_path):
+    """OIML R 35-1: 0.3 mm and 0.2 mm a metre, 230 ppm of 10 m."""
+    parts = strapped_parts()
+    parts.registers["instruments"]["T-12"]["correction"] = 230e-6
+    assert "tape_correction_strange" not in told(parts, tmp_path)
 
 
 def test_the_unit_of_a_pull_is_named(tmp_path):
