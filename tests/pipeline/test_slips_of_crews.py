@@ -13,7 +13,7 @@ from messages_told import lines
 from scipy.stats import binom
 
 import tankcal
-from tankcal.errors import InputError
+from tankcal.errors import InputError, SolutionError
 from tankcal.pipeline.compared_courses import BY_CHANCE, course_apart
 from tankcal.record import record_of
 
@@ -156,6 +156,25 @@ def test_a_manhole_under_the_only_strapped_course_is_asked_for(tmp_path):
     book.settings["checks.diameter_is"] = "inside"
     _, told = computed(tmp_path / "drawn", book)
     assert "size_told_by_one_course" not in told
+
+
+@pytest.mark.slow
+def test_former_radii_say_the_size_beside_lines(tmp_path):
+    """A manhole under the one strap contradicts them, and is refused."""
+    book = book_of("lines", 1002)
+    tank = book.tank
+    radius = tank.mean_m + 2 / 3 * tank.bulge_m  # of the mean area, but for its seams
+    book.tables["radii"] = [
+        {"course": str(c + 1), "radius_m": round(float(one), 5), "u_mm": 0.5}
+        for c, one in enumerate(radius)
+    ]
+    book.settings |= {"radii.source": "table", "radii.u_common_mm": 0.7}
+    book.settings |= {"change.common_mm": 0.5, "change.own_mm": 0.3}
+    _, told = computed(tmp_path / "sound", book)
+    assert "size_told_by_one_course" not in told
+    over_a_manhole(book)
+    with pytest.raises(SolutionError, match="former radii do not explain"):
+        computed(tmp_path / "slipped", book)
 
 
 @pytest.mark.study
