@@ -102,7 +102,7 @@ def noise_of_wall(wall):
     """(n, n) covariance of the readings; a field of points alone has it section by section."""
     if wall.read is not None:
         return wall.field.noise_m2
-    noise = wall.radii_by_points @ (wall.covariance_m2 @ wall.radii_by_points.T)
+    noise = wall.radii_by_points @ (wall.radii_by_points @ wall.covariance_m2).T
     return noise.toarray() if scipy.sparse.issparse(noise) else noise
 
 

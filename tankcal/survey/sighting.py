@@ -15,7 +15,6 @@ Source: ISO 7507-4; API MPMS 2.2D (method).
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import scipy.linalg
 
 from tankcal.geometry.circles import taubin_circle
 from tankcal.survey.points import Points
@@ -197,17 +196,18 @@ def sight(hits, poses, told_m=None):
         ],
         axis=2,
     )
-    covariance = scipy.linalg.block_diag(*(own @ own.transpose(0, 2, 1)))
     causes, unbound = _causes(hits, poses, by, tool, ray, cosine)
     unbound += _of_untied(poses, by)
-    for cause in causes:
-        if cause.what == "incidence":
-            covariance += np.outer(cause.column_m, cause.column_m)
+    biases = [cause.column_m for cause in causes if cause.what == "incidence"]
+    covariance = (
+        np.column_stack([by @ poses.covariance, *biases]) @ np.column_stack([by, *biases]).T
+    )
+    covariance.reshape(n, 3, n, 3)[one, :, one] += own @ own.transpose(0, 2, 1)
     points = Points(
         names=tuple(f"{name} {row}" for name, row in zip(hits.setup, _rows(hits), strict=True)),
         xyz_m=xyz,
         sd_m=None,
-        covariance_m2=covariance + by @ poses.covariance @ by.T,
+        covariance_m2=covariance,
         section=(None,) * n,
         generatrix=(None,) * n,
         rows=tuple(_rows(hits)),
