@@ -110,7 +110,7 @@ def _demo(options):
 
 def _tell(out, paths, warnings, result, adjustment):
     """Warnings, a summary and the files, for a person; what is implausible comes last of all."""
-    from tankcal.job.plausibility import CODES
+    from tankcal.job.plausibility_table import CODES
 
     doubts = [one for one in warnings if getattr(one.expected, "code", None) in CODES]
     warn(one for one in warnings if one not in doubts)

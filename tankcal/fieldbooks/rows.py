@@ -11,7 +11,8 @@ from tankcal.job.contract.observations import (
     SLOPE_DISTANCES,
     ZENITH_ANGLES,
 )
-from tankcal.job.fields import Refused, read_value
+from tankcal.job.field_values import read_value
+from tankcal.job.fields import Refused
 from tankcal.messages import message
 
 CONTRACT = {

@@ -1,36 +1,31 @@
 """Drawings of a calibrated tank: sections, the wall unrolled, the table and its budget.
 
-Plain numbers go in, `Drawing`s come out, in one style for notebooks and papers. Lengths of
-the page are inches. The words at the axes are those of WORDS, or of `words(key, **values)`.
+Plain numbers go in, `Drawing`s come out, in the one style of `tankcal.pipeline.plot_style`. The
+words at the axes are those of WORDS, or of `words(key, **values)`.
 """
 
-import io
-import logging
 import textwrap
 from dataclasses import dataclass
-from functools import wraps
-from math import ceil, floor, log10
+from math import ceil
 
-import matplotlib
 import numpy as np
 from matplotlib.collections import EllipseCollection
-from matplotlib.figure import Figure
 
-logging.getLogger("matplotlib").setLevel(logging.ERROR)  # no remark about its font cache on paper
+from tankcal.pipeline.plot_style import (
+    FAINT,
+    GREY,
+    INK,
+    PALE,
+    RED,
+    WIDTH,
+    Drawing,
+    even_groups,
+    rasterize_many,
+    round_factor,
+    set_margins,
+    styled,
+)
 
-STYLE = {
-    "font.family": ["STIXGeneral", "DejaVu Serif"],
-    "font.size": 8.5,
-    "axes.linewidth": 0.5,
-    "axes.edgecolor": "#445566",
-    "axes.unicode_minus": True,
-    "xtick.major.width": 0.5,
-    "ytick.major.width": 0.5,
-    "grid.linewidth": 0.3,
-    "grid.color": "#c3cad2",
-    "lines.linewidth": 0.9,
-}
-_DPI_ON_SCREEN = 110
 WORDS = {
     "azimuth": "Azimuth / °",
     "residual": "Residual / mm",
@@ -42,35 +37,11 @@ WORDS = {
     "section": "Section {section}",
     "section_height": "height {height}",
 }
-INK, RED, PALE = "#1f4e79", "#b03a2e", "#9db8d2"
-GREY, FAINT = "#445566", "#9aa5b1"
 LEAST_SHARE = 1e-3  # of the variance: less is no bar
-WIDTH = 6.5
 LETTERS_OF_A_BAR = 46  # in a line of its name
-MANY = 500  # points in a panel: from here on their picture is smaller than their outlines
 SHELL_SHARE = 0.03  # of its cut: so far the cut of a shell changes with height
 BOTTOM_SHARE = 0.8  # of the cut of the shell: below it the curve of a bottom would hide the shell's
 _TURN = (-4, 364)  # degrees: points at north are not cut off
-
-
-def styled(draw, **more):
-    """A function that draws in the one style of notebooks and papers; `more` adds to that style."""
-
-    @wraps(draw)
-    def drawing(*arguments, **options):
-        with matplotlib.rc_context(STYLE | more):
-            return draw(*arguments, **options)
-
-    return drawing
-
-
-class Drawing(Figure):
-    """A matplotlib Figure that a notebook shows, whatever backend it has."""
-
-    def _repr_png_(self):
-        image = io.BytesIO()
-        self.savefig(image, format="png", dpi=_DPI_ON_SCREEN)
-        return image.getvalue()
 
 
 def english_label(key, **values):
@@ -165,27 +136,6 @@ def polar_factor(rings):
         for ring in rings
     )
     return round_factor(0.25 / largest) if largest > 0 else 1
-
-
-def round_factor(wanted):
-    """The largest of 1, 2, 5 times a power of ten that is at most `wanted`, and at least 1.
-
-    Parameters
-    ----------
-    wanted : float
-        Above 0.
-
-    Returns
-    -------
-    int
-
-    Examples
-    --------
-    >>> round_factor(470.0), round_factor(0.3)
-    (200, 1)
-    """
-    power = 10.0 ** floor(log10(wanted))
-    return max(1, round(power * max(step for step in (1, 2, 5) if step * power <= wanted)))
 
 
 def polar(rings, words=english_label, most=12):
@@ -460,40 +410,3 @@ def network(names, xy_m, covariance_m2, most_names=60):
     ax.set_title(f"standard error ellipses, {factor} times", loc="left", fontsize=8)
     ax.grid(True)
     return figure
-
-
-def even_groups(items, most):
-    """Split items into groups of nearly equal size: sections into figures, columns into tables.
-
-    Parameters
-    ----------
-    items : sequence
-    most : int
-        Items in one group.
-
-    Returns
-    -------
-    list of sequence
-
-    Examples
-    --------
-    >>> even_groups("abcde", 4)
-    ['abc', 'de']
-    """
-    count = max(1, ceil(len(items) / most))
-    size = max(1, ceil(len(items) / count))
-    return [items[i : i + size] for i in range(0, len(items), size)]
-
-
-def rasterize_many(points):
-    """Very many points are drawn as a picture inside the figure."""
-    return {"rasterized": len(points) > MANY}
-
-
-def set_margins(figure, left, right, bottom, top, **spaces):
-    """Margins of a figure in inches."""
-    width, height = figure.get_size_inches()
-    figure.subplots_adjust(
-        left=left / width, right=1 - right / width, bottom=bottom / height, top=1 - top / height,
-        **spaces,
-    )  # fmt: skip

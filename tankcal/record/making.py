@@ -17,8 +17,9 @@ from tankcal.job.model.settings import (
     Tank,
 )
 from tankcal.pipeline.corrections import Correction
-from tankcal.record import statements, survey, table, texts
+from tankcal.record import statements, survey, table, tank_parts, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
+from tankcal.record.choices import Choice, adjustment_choices, choices_of
 from tankcal.record.clouds import CloudsRecord, clouds_of
 from tankcal.record.great_circles import GreatCirclesRecord, great_circles_of
 from tankcal.record.hits import HitsRecord, hits_of
@@ -127,15 +128,15 @@ class Record(Saved, kw_only=True):
     densities: list[table.VolumesOfDensity] = key("further densities of the liquid", default=())
     gross: table.GrossShell | None = key("null for a tank without courses", default=None)
     corrections: list[Correction] = key("that bear on the job, in their order", default=())
-    solid: list[table.Detail] | None = key("sizes of a tank without courses", default=None)
-    bottom: list[table.Detail] | None = key("how it was taken; null: it is flat", default=None)
-    top: list[table.Detail] | None = key(
+    solid: list[tank_parts.Detail] | None = key("sizes of a tank without courses", default=None)
+    bottom: list[tank_parts.Detail] | None = key("how it was taken; null: it is flat", default=None)
+    top: list[tank_parts.Detail] | None = key(
         "the head on top; left out where there is none", default=None, optional=True
     )
     deadwood: list[Deadwood] = key("as declared, whether or not it is on", default=())
-    roof: list[table.Detail] | None = key("the floating roof", default=None)
+    roof: list[tank_parts.Detail] | None = key("the floating roof", default=None)
     budget: list[statements.BudgetLine] = key("of the top row, by the table alone", default=())
-    choices: list[table.Choice] = key("everything that was assumed")
+    choices: list[Choice] = key("everything that was assumed")
     warnings: list[texts.WarningRecord] = key("what should be read")
     adjustment: AdjustmentRecord | None = key("null: points were handed in", default=None)
     budgets: list[statements.StatedBudget] = key("stated volumes, then deliveries", default=())
@@ -181,13 +182,13 @@ def record_of(result):
             densities=table.densities_of(result),
             gross=table.gross_of(result),
             corrections=result.corrections,
-            solid=table.solid_of(result),
-            bottom=table.bottom_of(result),
-            top=table.top_of(result),
+            solid=tank_parts.solid_of(result),
+            bottom=tank_parts.bottom_of(result),
+            top=tank_parts.top_of(result),
             deadwood=job.deadwood,
-            roof=table.roof_of(result),
+            roof=tank_parts.roof_of(result),
             budget=statements.budget_of(result),
-            choices=table.choices_of(result),
+            choices=choices_of(result),
             warnings=texts.warnings_of(result.warnings),
             adjustment=adjustment and adjustment_of(adjustment, job.measurements),
             budgets=statements.budgets_of(result),
@@ -206,7 +207,7 @@ def record_of_adjustment(job, adjustment):
             **_beginning(job),
             points=survey.points_of_adjustment(adjustment),
             overrulings=overrulings_of_adjustment(job),
-            choices=table.adjustment_choices(adjustment, measurements),
+            choices=adjustment_choices(adjustment, measurements),
             warnings=texts.warnings_of(dict.fromkeys((*job.warnings, *adjustment.warnings))),
             adjustment=adjustment_of(adjustment, measurements),
         )

@@ -3,7 +3,7 @@
 Printed when given, never invented: what is not given is a line to write on, or named as missing.
 """
 
-from tankcal.job.plausibility import CODES
+from tankcal.job.plausibility_table import CODES
 from tankcal.report import blocks
 from tankcal.report.tables.facts import (
     CERTIFICATE,

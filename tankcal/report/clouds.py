@@ -6,7 +6,7 @@ import matplotlib
 import numpy as np
 from matplotlib.patches import Rectangle
 
-from tankcal.pipeline.plots import GREY, WIDTH, Drawing, styled
+from tankcal.pipeline.plot_style import GREY, WIDTH, Drawing, styled
 from tankcal.report.tables import clouds as tables
 
 FULL_COLOUR = 98  # percentile of the departures, in size

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.pipeline.plots import FAINT, GREY, INK, RED, WIDTH, Drawing, set_margins, styled
+from tankcal.pipeline.plot_style import FAINT, GREY, INK, RED, WIDTH, Drawing, set_margins, styled
 from tankcal.report import numbers
 from tankcal.report.metered_liquid import density_text, with_u
 from tankcal.report.tables import liquid as tables

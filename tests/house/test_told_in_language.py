@@ -12,7 +12,8 @@ from tankcal.cli.asked_language import asked_language
 from tankcal.cli.showing import say_in_language, speak
 from tankcal.errors import InputError, Problem
 from tankcal.job.contract import KEYS
-from tankcal.job.fields import Field, Refused, read_value
+from tankcal.job.field_values import read_value
+from tankcal.job.fields import Field, Refused
 from tankcal.job.starter import write_starter
 from tankcal.job.tables import in_book
 from tankcal.messages import Message

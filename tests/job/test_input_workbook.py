@@ -29,7 +29,7 @@ from tankcal.job.contract import (
     SURVEYS,
     columns_of,
 )
-from tankcal.job.fields import read_value
+from tankcal.job.field_values import read_value
 from tankcal.job.sheets import is_read
 from tankcal.job.starter import write_input_workbook
 from tankcal.job.starter.examples import EXAMPLES_OF_KEYS, EXAMPLES_OF_TABLES

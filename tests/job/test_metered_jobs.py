@@ -16,7 +16,7 @@ from metered_tanks import METER, column, metered_parts, metered_rows
 import tankcal
 from tankcal.errors import InputError
 from tankcal.job.checks.sized_volumes import volume_by_sizes
-from tankcal.job.plausibility import TABLE
+from tankcal.job.plausibility_table import TABLE
 from tankcal.job.starter import write_starter
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words, say

@@ -7,7 +7,8 @@ import openpyxl
 import pytest
 from job_builder import job_parts, write_book
 
-from tankcal.job.fields import Field, Refused, read_value
+from tankcal.job.field_values import read_value
+from tankcal.job.fields import Field, Refused
 from tankcal.job.folder import read_csv, read_folder, read_toml
 from tankcal.job.sheets import read_workbook
 from tankcal.job.tables import MAX_PROBLEMS_PER_FILE, BadCell, Log, nearest, shown

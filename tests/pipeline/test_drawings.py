@@ -5,7 +5,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import STYLE, bottom_rows, capacity_curves
+from tankcal.pipeline.plot_style import STYLE
+from tankcal.pipeline.plots import bottom_rows, capacity_curves
 from tankcal.text.labels import Label, write_labels
 
 

@@ -19,7 +19,7 @@ from uncertain_job import HOSTILE, as_before, write_uncertain_job
 import tankcal
 from tankcal.gum.distributions import NAMES
 from tankcal.job.contract.uncertainty import INPUTS
-from tankcal.pipeline import plots
+from tankcal.pipeline import plot_style
 from tankcal.record import record_of, save
 from tankcal.record.plain_data import to_plain
 from tankcal.record.statements import budgets_of
@@ -325,7 +325,7 @@ def test_bars_of_defaults_are_pale(record):
     other["budget"][1]["is_default"] = True
     (ax,) = figures.budget_bars(Paper(other)).axes
     names = [label.get_text() for label in ax.get_yticklabels()]
-    pale = [to_hex(bar.get_facecolor()) == plots.PALE for bar in ax.patches]
+    pale = [to_hex(bar.get_facecolor()) == plot_style.PALE for bar in ax.patches]
     assert pale == [name.endswith("(default)") for name in names]
     assert pale.count(True) == 1
     shares = [bar.get_width() for bar in ax.patches]

@@ -14,7 +14,8 @@ from job_builder import assert_same_job, write_book, write_folder
 from survey_builder import PLACES, WALL, dms, length, read_on_comparator, survey_parts
 
 from tankcal.job import load
-from tankcal.job.fields import Field, Refused, read_value
+from tankcal.job.field_values import read_value
+from tankcal.job.fields import Field, Refused
 from tankcal.job.tables import SURVEY_TABLES
 
 DEGREE = np.pi / 180

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from tankcal.errors import InputError, Problem
-from tankcal.job.fields import Field, Refused, is_blank, read_value
+from tankcal.job.field_values import read_value
+from tankcal.job.fields import Field, Refused, is_blank
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log, nearest, read_bytes
 from tankcal.messages import message

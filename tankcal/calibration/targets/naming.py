@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.job.fields import Field, Refused, is_blank, read_value
+from tankcal.job.field_values import read_value
+from tankcal.job.fields import Field, Refused, is_blank
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import MAX_FILE_BYTES, nearest, read_bytes, shown
 from tankcal.messages import message

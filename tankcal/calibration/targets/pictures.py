@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from tankcal.calibration.targets.opencv import opencv
-from tankcal.job.fields import Field, read_value
+from tankcal.job.field_values import read_value
+from tankcal.job.fields import Field
 from tankcal.job.tables import read_bytes
 from tankcal.messages import message
 

@@ -7,10 +7,11 @@ other language hold theirs.
 from dataclasses import dataclass
 
 from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
-from tankcal.job.fields import MAX_NAME, MAX_TEXT
+from tankcal.job.fields import MAX_TEXT
 from tankcal.text.digits import shortest, superscript
 from tankcal.text.form_words import word_of
 from tankcal.text.languages import DEFAULT
+from tankcal.text.naming import MAX_NAME
 from tankcal.text.numerals import NUMBER
 from tankcal.text.words import load_words, marks_of
 

@@ -3,9 +3,10 @@
 import datetime
 import math
 
-from tankcal.job.fields import MAX_NAME, MAX_TEXT
+from tankcal.job.fields import MAX_TEXT
 from tankcal.job.starter.texts import is_wide
 from tankcal.text.form_words import NO, YES
+from tankcal.text.naming import MAX_NAME
 
 LONGEST_LIST = 255  # letters: Excel drops a longer one
 LONGEST_TITLE, LONGEST_MESSAGE = 32, 255

@@ -6,12 +6,12 @@ from math import ceil, floor, log10
 
 import numpy as np
 
-from tankcal.pipeline import plots
-from tankcal.pipeline.plots import INK, RED
+from tankcal.pipeline import plot_style
+from tankcal.pipeline.plot_style import INK, RED
 
 COLOURS = (INK, RED, "#3b7d4f", "#b8860b", "#6a4c93", "#1b998b", "#8a5a44", "#555555")
 DASHES = ("-", "--", ":")
-styled = partial(plots.styled, **{"mathtext.fontset": "stix"})
+styled = partial(plot_style.styled, **{"mathtext.fontset": "stix"})
 
 
 def line_style(number):

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import FAINT, INK, RED, WIDTH, set_margins
+from tankcal.pipeline.plot_style import FAINT, INK, RED, WIDTH, set_margins
 from tankcal.report.camera.drawings import mathematical, matrix, over_whole_decades, styled
 from tankcal.report.camera.parameter_tests import in_pixels
 from tankcal.text.digits import fixed

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import FAINT, GREY, INK, RED, WIDTH, set_margins
+from tankcal.pipeline.plot_style import FAINT, GREY, INK, RED, WIDTH, set_margins
 from tankcal.report import numbers
 from tankcal.report.camera.drawings import line_style, styled
 from tankcal.report.camera.influence import adjusted, label

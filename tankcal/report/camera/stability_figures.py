@@ -9,7 +9,7 @@ from matplotlib.patches import Rectangle
 
 from tankcal.calibration.curves import decentring_profile, radial_curve
 from tankcal.camera.model import PARAMETERS, Form
-from tankcal.pipeline.plots import FAINT, INK, WIDTH, even_groups, set_margins
+from tankcal.pipeline.plot_style import FAINT, INK, WIDTH, even_groups, set_margins
 from tankcal.report.camera.drawings import line_style, mathematical, matrix, styled
 from tankcal.report.camera.naming import numbered
 from tankcal.report.camera.stability import KEYS, numbered_labels

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import FAINT, GREY, INK, RED, WIDTH, set_margins
+from tankcal.pipeline.plot_style import FAINT, GREY, INK, RED, WIDTH, set_margins
 from tankcal.report.camera.drawings import COLOURS, line_style, styled
 
 HIGH = 2.5  # inches

@@ -6,7 +6,16 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tankcal.pipeline import plots
-from tankcal.pipeline.plots import FAINT, GREY, INK, PALE, RED, WIDTH, round_factor, set_margins
+from tankcal.pipeline.plot_style import (
+    FAINT,
+    GREY,
+    INK,
+    PALE,
+    RED,
+    WIDTH,
+    round_factor,
+    set_margins,
+)
 from tankcal.report.camera.drawings import styled
 from tankcal.report.inspection.tables import (
     is_low,

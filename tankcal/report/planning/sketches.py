@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import (
+from tankcal.pipeline.plot_style import (
     FAINT,
     GREY,
     INK,

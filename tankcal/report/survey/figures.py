@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import (
+from tankcal.pipeline.plot_style import (
     FAINT,
     GREY,
     INK,

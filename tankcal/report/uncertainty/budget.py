@@ -1,6 +1,6 @@
 """Budgets: line by line for the top row and a delivery, contributions for the others."""
 
-from tankcal.pipeline.plots import even_groups
+from tankcal.pipeline.plot_style import even_groups
 from tankcal.report import blocks
 from tankcal.report.numbers import degrees_of_freedom, like_its_sd, symbol
 from tankcal.report.tables import Column, Table

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 
-from tankcal.pipeline.plots import FAINT, INK, RED, WIDTH, set_margins, styled
+from tankcal.pipeline.plot_style import FAINT, INK, RED, WIDTH, set_margins, styled
 
 _SHORT_AXIS = 20  # from its lowest number to its highest: beyond, powers of ten are enough
 _MOST = 98  # per cent of the differences that the frame holds at least

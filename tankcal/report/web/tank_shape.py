@@ -8,7 +8,7 @@ from math import sqrt
 
 import numpy as np
 
-from tankcal.pipeline.plots import round_factor
+from tankcal.pipeline.plot_style import round_factor
 from tankcal.report.blocks import Block
 from tankcal.report.web.packing import packed
 from tankcal.report.web.wall_map import rejected_in_space

@@ -1,0 +1,354 @@
+"""How the value of a cell or key is read by the kind of its field.
+
+`read_value` turns what stands in the file into a Python value, or raises `Refused` with what was
+found and what was expected. What a field is: `tankcal.job.fields`.
+"""
+
+import datetime
+import math
+import re
+import unicodedata
+
+from tankcal.job.fields import MAX_TEXT, Field, Refused, is_blank
+from tankcal.job.hints import hint_of_date, hint_of_number, hint_of_text
+from tankcal.job.tables import BadCell, Percent, nearest, shown
+from tankcal.messages import message
+from tankcal.text.form_words import NO, YES, meant
+from tankcal.text.naming import MAX_NAME, is_name
+from tankcal.text.numerals import NUMBER
+
+MAX_LIST = 50  # numbers or pairs
+MAX_NAMES = 5000
+MAX_ROWS = 4000
+IN_TOML = "toml"  # in place of a decimal mark: a number is a number, and never a cell
+NEXT_TO_ZERO = 1e-30  # no size, no standard deviation is so small: its square would be nothing
+
+_TANK_ID = re.compile(r"(?!.*\.\.)[\w(][\w .()-]*")
+_RULE_NAME = re.compile(r"(?!.*\.\.)\w[\w .()-]*")
+_MESH_FILE = re.compile(r"(?!.*\.\.)\w[\w .()-]*\.(stl|obj|ply|off)", re.IGNORECASE)
+_CLOUD_FILE = re.compile(
+    r"(?!.*\.\.)\w[\w .()/-]*\.(las|laz|e57|ply|ptx|pts|xyz|asc|txt|csv)", re.IGNORECASE
+)
+_DMS = re.compile(
+    r"([+-]?)([0-9]{1,3})(?:[ \t]*[°º][ \t]*|[ \t]+|-)([0-9]{1,2})(?:"
+    r"(?:[ \t]*['′’][ \t]*|[ \t]+|-)([0-9]{1,2}(?:[.,][0-9]{0,9})?)[ \t]*(?:\"|″|”|''|′′)?|['′’]?)"
+)
+_PAIR = re.compile(r"\s*([0-9.]+)\s*[-–]\s*([0-9.]+)\s*")
+_ISO_TIME = re.compile(
+    r"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ][0-9]{2}:[0-9]{2}(:[0-9]{2}(\.[0-9]{1,6})?)?"
+)
+_EPOCH = datetime.datetime(2000, 1, 1)
+_ISO_DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
+
+
+def read_value(field, raw, decimal=None):
+    """The value of a field as float, text or bool; `raw` is not blank.
+
+    decimal is the mark of numbers that stand as text (CSV), or None (workbook) or IN_TOML where a
+    number is a number. Raises Refused.
+    """
+    if isinstance(raw, BadCell):
+        raise Refused(
+            message(
+                "complaint",
+                "{complaint}; expected {expected}",
+                complaint=raw.complaint,
+                expected=field.expectation(),
+            )
+        )
+    reader = {
+        "number": _read_number,
+        "choice": _read_choice,
+        "flag": _read_flag,
+        "date": _read_date,
+        "time": _read_time,
+        "numbers": _read_numbers,
+        "ranges": _read_ranges,
+        "names": _read_names,
+        "rows": _read_rows,
+        "dms": _read_dms,
+    }.get(field.kind, _read_text)
+    return reader(field, raw, decimal)
+
+
+def _refused(field, found, hint=""):
+    """Refused of a value that is not what the field takes."""
+    return Refused(
+        message(
+            "found_expected",
+            "found {found}; expected {expected}{hint}",
+            found=found,
+            expected=field.expectation(),
+            hint=hint,
+        )
+    )
+
+
+def _read_number(field, raw, decimal):
+    if field.choices and isinstance(raw, str) and raw.strip() in field.choices:
+        return raw.strip()
+    if isinstance(raw, str):
+        value = _number_of_text(field, raw, decimal)
+    elif isinstance(raw, int | float) and not isinstance(raw, bool | Percent):
+        value = _float(raw)
+    else:
+        raise _refused(field, _kind_of(raw), hint_of_number(raw))
+    if not math.isfinite(value):
+        raise _refused(field, shown(raw), message("not_infinite", ", not NaN or infinite"))
+    if field.low == 0 < value < NEXT_TO_ZERO:
+        raise _refused(
+            field, shown(raw), message("next_to_zero", ": 0, or a number further from 0")
+        )
+    if value > field.high or value < field.low or (field.above_low and value == field.low):
+        hint = _other_unit(field, value)
+        raise _refused(field, shown(raw), hint)
+    return value
+
+
+def _number_of_text(field, raw, decimal):
+    text = raw.strip(" \t")
+    if len(text) > MAX_NAME:
+        raise _refused(field, shown(raw))
+    plain = text.replace(",", ".") if decimal != "." else text
+    is_number = NUMBER.fullmatch(plain) is not None
+    if decimal in (None, IN_TOML):
+        hint = hint_of_text(text, in_cell=decimal is None)
+        found = message("the_text", "the text {found}", found=shown(raw))
+        raise _refused(field, found, hint)
+    if is_number and not (decimal == "," and "." in text):
+        return float(plain)
+    if decimal == "." and NUMBER.fullmatch(text.replace(",", ".")):
+        hint = message(
+            "with_decimal_point",
+            " with a decimal point; for decimal commas set [csv] decimal = ','",
+        )
+    elif decimal == "," and NUMBER.fullmatch(text):
+        hint = message("with_decimal_comma", " with a decimal comma, as [csv] decimal says")
+    else:
+        hint = ""
+    raise _refused(field, shown(raw), hint)
+
+
+def _float(raw):
+    try:
+        return float(raw)
+    except OverflowError:
+        return math.inf
+
+
+def _kind_of(raw):
+    """A value as found, with its kind where that is what is wrong with it."""
+    found = shown(raw)
+    if isinstance(raw, bool):
+        return message("the_truth_value", "the truth value {found}", found=found)
+    if isinstance(raw, datetime.date):
+        return message("the_date", "the date {found}", found=found)
+    if isinstance(raw, datetime.time | datetime.timedelta):
+        return message("the_time", "the time {found}", found=found)
+    if isinstance(raw, Percent):
+        return message("the_percentage", "the percentage {found}", found=found)
+    return found
+
+
+def _other_unit(field, value):
+    if "_per_" in field.name:
+        return ""
+    if field.name.endswith("_deg") and field.high < abs(value) <= field.high * 10 / 9:
+        return message("is_in_gon", " (is it in gon?)")
+    if field.name.startswith("zenith_") and value > field.high:
+        return message("second_face", " (in the second face? give the mean of both)")
+    if field.name.endswith("_mm"):
+        return message("in_millimetres", " (in millimetres: is it in another unit?)")
+    if field.name.endswith("_m"):
+        return message("in_metres", " (in metres: is it in another unit?)")
+    return ""
+
+
+def _read_text(field, raw, _decimal):
+    if isinstance(raw, str):
+        text = raw.replace("\u00a0", " ").strip()
+    elif isinstance(raw, bool | dict | list):
+        raise _refused(field, _kind_of(raw))
+    elif isinstance(raw, float) and raw.is_integer() and abs(raw) < 1e15:
+        text = str(int(raw))
+    elif isinstance(raw, int) and abs(raw) >= 1e15:
+        raise _refused(field, shown(raw))
+    elif isinstance(raw, datetime.datetime) and raw.time() == datetime.time(0):
+        text = raw.date().isoformat()
+    else:
+        text = str(raw)
+    if field.kind == "text":
+        sound = len(text) <= MAX_TEXT and all(_is_writing(char) for char in text)
+    elif field.kind == "name":
+        sound = is_name(text)
+    else:
+        patterns = {
+            "tank id": _TANK_ID,
+            "mesh file": _MESH_FILE,
+            "cloud file": _CLOUD_FILE,
+            "rule name": _RULE_NAME,
+        }
+        pattern = patterns[field.kind]
+        sound = len(text) <= MAX_NAME and pattern.fullmatch(text) is not None
+    if not sound:
+        raise _refused(field, shown(text))
+    return meant(text, field.choices) or text
+
+
+def _is_writing(char):
+    return char.isprintable() or unicodedata.category(char) == "Zs"
+
+
+def _read_choice(field, raw, _decimal):
+    is_padded = isinstance(raw, str) and raw not in field.choices
+    text = raw.strip() if is_padded else raw
+    if is_padded and text not in field.choices:
+        text = meant(text, field.choices) or text
+    if text not in field.choices:
+        hint = nearest(text, field.choices) if isinstance(text, str) else ""
+        raise _refused(field, shown(raw), hint)
+    return text
+
+
+def _read_flag(field, raw, _decimal):
+    if isinstance(raw, bool):
+        return raw
+    if isinstance(raw, str):
+        word = raw.strip().lower()
+        word = word if word in (YES, NO) else meant(word, (YES, NO))
+        if word is not None:
+            return word == YES
+    raise _refused(field, shown(raw))
+
+
+def _read_date(field, raw, _decimal):
+    if isinstance(raw, datetime.datetime):
+        return raw.date().isoformat()
+    if isinstance(raw, datetime.date):
+        return raw.isoformat()
+    text = raw.strip() if isinstance(raw, str) else ""
+    try:
+        if _ISO_DATE.fullmatch(text):
+            return datetime.date.fromisoformat(text).isoformat()
+    except ValueError:
+        pass
+    raise _refused(field, shown(raw), hint_of_date(raw))
+
+
+def _read_time(field, raw, _decimal):
+    text = raw.strip() if isinstance(raw, str) else ""
+    try:
+        if isinstance(raw, datetime.datetime):
+            moment = raw
+        elif _ISO_TIME.fullmatch(text):
+            moment = datetime.datetime.fromisoformat(text)
+        else:
+            raise _refused(field, shown(raw), hint_of_date(raw))
+    except ValueError as error:
+        if isinstance(error, Refused):
+            raise
+        raise _refused(field, shown(raw)) from error
+    return (moment.replace(tzinfo=None) - _EPOCH).total_seconds()
+
+
+def _read_numbers(field, raw, decimal):
+    """Tuple of a list of numbers, of a text such as 700; 850, or of one number."""
+    parts = raw.split(";") if isinstance(raw, str) else raw if isinstance(raw, list) else [raw]
+    if not parts or len(parts) > MAX_LIST:
+        raise Refused(
+            message(
+                "found_not_so_many",
+                "found {found}; expected 1 to {most} {expected}",
+                found=shown(raw),
+                most=MAX_LIST,
+                expected=field.expectation(),
+            )
+        )
+    is_text = isinstance(raw, str)
+    mark = "." if is_text else decimal
+    try:
+        return tuple(_read_number(field, part.strip() if is_text else part, mark) for part in parts)
+    except Refused as refusal:
+        raise _refused(field, refusal.text.values["found"]) from None
+
+
+def _read_rows(field, raw, decimal):
+    """Tuple of rows of numbers, of a list of lists or of a text such as 1 0 0; 0 1 0."""
+    if isinstance(raw, str) and raw.strip() in field.choices:
+        return raw.strip()
+    rows = raw
+    if isinstance(raw, str):
+        rows = [part.split() for part in raw.split(";") if part.strip()]
+    elif isinstance(raw, list) and raw and not any(isinstance(row, list) for row in raw):
+        rows = [raw]
+    if not isinstance(rows, list) or not 0 < len(rows) <= MAX_ROWS:
+        raise _refused(field, shown(raw))
+    if not all(isinstance(row, list) and len(row) == field.width for row in rows):
+        raise _refused(field, shown(raw))
+    mark = "." if isinstance(raw, str) else decimal
+    one = Field(field.name, "number", field.note, low=field.low, high=field.high)
+    try:
+        return tuple(tuple(_read_number(one, value, mark) for value in row) for row in rows)
+    except Refused as refusal:
+        raise _refused(field, refusal.text.values["found"]) from None
+
+
+def _read_names(field, raw, _decimal):
+    """Tuple of texts of a list, of a text such as P7; P9, or of one number that is a name."""
+    parts = raw.split(";") if isinstance(raw, str) else raw if isinstance(raw, list) else [raw]
+    if len(parts) > MAX_NAMES:
+        raise Refused(
+            message(
+                "too_many_of_them",
+                "{count} of them; expected at most {most}",
+                count=len(parts),
+                most=MAX_NAMES,
+            )
+        )
+    text = Field(field.name, "text", field.note)
+    names = []
+    for part in parts:
+        if is_blank(part) or isinstance(part, dict | list):
+            raise _refused(field, shown(raw))
+        names.append(_read_text(text, part, None))
+    return tuple(names)
+
+
+def _read_dms(field, raw, _decimal):
+    """Degrees of a text such as 123 04 05.6, 123-04-05.6 or 123°04'05.6\"; negative: -0 30 00."""
+    if not isinstance(raw, str):
+        raise Refused(
+            message(
+                "expected_text_of",
+                "found {found}; expected the text of {expected}",
+                found=_kind_of(raw),
+                expected=field.expectation(),
+            )
+        )
+    match = _DMS.fullmatch(raw.replace("\u00a0", " ").strip())
+    if match is None:
+        raise _refused(field, shown(raw))
+    sign, degrees, minutes, seconds = match.groups()
+    seconds = float((seconds or "0").replace(",", "."))  # a thousands mark it cannot be
+    if int(minutes) >= 60 or seconds >= 60:
+        hint = message("minutes_below_60", ", minutes and seconds below 60")
+        raise _refused(field, shown(raw), hint)
+    value = (int(degrees) * 3600 + int(minutes) * 60 + seconds) / 3600
+    value = -value if sign == "-" else value
+    if not field.low <= value <= field.high:
+        raise _refused(field, shown(raw))
+    return value
+
+
+def _read_ranges(field, raw, _decimal):
+    """Tuple of (low, high) of a list of pairs, or of a text such as 0-0.3; 2.1-2.4."""
+    pairs = raw
+    if isinstance(raw, str):
+        matches = [_PAIR.fullmatch(part) for part in raw.split(";")]
+        pairs = [match.groups() for match in matches] if all(matches) else None
+    is_list = isinstance(pairs, list) and 0 < len(pairs) <= MAX_LIST
+    if not is_list or not all(isinstance(pair, list | tuple) and len(pair) == 2 for pair in pairs):
+        raise _refused(field, _kind_of(raw))
+    decimal = "." if isinstance(raw, str) else None
+    number = Field(field.name, "number", field.note, low=0, high=200)
+    return tuple(tuple(_read_number(number, end, decimal) for end in pair) for pair in pairs)
