@@ -2,20 +2,27 @@
 
 Each sees a part of the wall, a generatrix at least. From its own hits it has the axis of the tank
 at some distance and direction; its azimuth round the tank is that of its station, or even in the
-order of the set-ups. Then all untied poses are fitted together to a leaning surface of revolution
-with a radius of its own at each level,
+order of the hits. Then all untied poses are fitted together to a leaning surface of revolution with
+a radius of its own at each level,
 
     |hit - axis(z)| = R_level,   axis(z) = (x, y) + (mx, my) z,
 
 what nothing determines staying where it is. The wall itself then has them as unknowns.
+
+A shell that leans tells in which order they stand round it: the other way round they see it lean to
+as many sides. So an order that was only assumed is that of the better fit, clockwise or not, and
+stations that fit much worse than mirrored, or than two of them exchanged, are refused.
 """
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
+from tankcal.errors import InputError, Problem
 from tankcal.geometry.circles import taubin_circle
 from tankcal.geometry.outlines import FULL_TURN
+from tankcal.messages import message
 from tankcal.survey.sighting import certified_m, rays
 
 LEVEL_GAP_M = 0.15  # between heights that are fitted with radii of their own
@@ -25,6 +32,8 @@ START_OF_LINE = (0.3, 1e-3, 1e-3)  # of one that sees a line
 AXIS_SDS = (0.3, 0.3, 0.02, 0.02)  # m, and m/m of its lean
 WALL_SD_M, FAR_SDS = 0.005, 3.0  # of a hit from that surface; further ones weigh less
 ROUNDS, CENTRE_ROUNDS = 15, 20
+MIRRORED, EXCHANGED = 1.15, 1.3  # times the rms of that order (sound ones: 1.02, 1.13): refused
+MOST_EXCHANGED = 12  # set-ups that are tried with any two exchanged
 
 
 def place_untied(hits, poses, untied, *, nominal_m, is_inside):
@@ -46,24 +55,83 @@ def place_untied(hits, poses, untied, *, nominal_m, is_inside):
     Returns
     -------
     Poses
+
+    Raises
+    ------
+    InputError
+        For stations that stand in another order round the tank.
     """
     pose = poses.place_of(hits)
     own = certified_m(hits)[:, None] * rays(hits.direction_rad, hits.zenith_rad)[0]
     tied = ~np.isin(pose, untied)
     axis = _axis(hits, poses, own, pose, tied, untied)
-    xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
     around = np.array([sees_all_around(own[pose == one]) for one in untied])
+    centres = [
+        _centre(own[pose == one], nominal_m, seen if around.any() else is_inside)
+        for one, seen in zip(untied, around, strict=True)
+    ]
+    given = _azimuths(hits, poses, untied, axis)
+
+    def placed(azimuth):
+        xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
+        for one, at, centre in zip(untied, azimuth, centres, strict=True):
+            xyz[one, :2] = axis + np.hypot(*centre) * np.array([np.sin(at), np.cos(at)])
+            zero[one] = at + np.pi - np.arctan2(*centre)
+        return _fitted(replace(poses, xyz_m=xyz, orientation_rad=zero), own, pose, untied, axis)
+
+    even = FULL_TURN * np.arange(len(untied)) / len(untied)
+    found, misfit = placed(np.where(np.isnan(given), even, given))
+    if tied.any() or len(untied) < 3:
+        return found
+    if np.isnan(given).all():
+        other, more = placed(-even)
+        return other if more < misfit else found
+    if not np.isnan(given).any():
+        _refuse_order(hits, [poses.keys[one][0] for one in untied], given, placed, misfit)
+    return found
+
+
+def _azimuths(hits, poses, untied, axis):
+    """(untied,) of the stations from the axis; nan: not known."""
+    found = np.full(len(untied), np.nan)
     for number, one in enumerate(untied):
         station = hits.stations.get(hits.setups[poses.keys[one][0]].station)
         away = None if station is None else station[:2] - axis
-        known = away is not None and np.all(np.isfinite(away)) and np.hypot(*away) > 0
-        azimuth = np.arctan2(*away) if known else FULL_TURN * number / len(untied)
-        in_tank = around[number] if around.any() else is_inside
-        centre = _centre(own[pose == one], nominal_m, in_tank)
-        distance = np.hypot(*centre)
-        xyz[one, :2] = axis + distance * np.array([np.sin(azimuth), np.cos(azimuth)])
-        zero[one] = azimuth + np.pi - np.arctan2(*centre)
-    return _fitted(replace(poses, xyz_m=xyz, orientation_rad=zero), own, pose, untied, axis)
+        if away is not None and np.all(np.isfinite(away)) and np.hypot(*away) > 0:
+            found[number] = np.arctan2(*away)
+    return found
+
+
+def _refuse_order(hits, names, azimuth, placed, misfit_m):
+    """Raise InputError where stations fit much better mirrored, or with two of them exchanged."""
+    mirrored = placed(-azimuth)[1]
+    if misfit_m > MIRRORED * mirrored:
+        text = message(
+            "stations_mirrored",
+            "the hits fit a tank with stations the other way round it (rms {other_mm:.1f} mm for"
+            " {rms_mm:.1f} mm): are x and y exchanged, or has one the other sign?",
+            other_mm=1000 * mirrored,
+            rms_mm=1000 * misfit_m,
+        )
+        raise InputError(Problem("control.csv", text, column="x_m"))
+    if len(names) > MOST_EXCHANGED:
+        return
+    for one, other in combinations(range(len(names)), 2):
+        exchanged = azimuth.copy()
+        exchanged[[one, other]] = azimuth[[other, one]]
+        rms = placed(exchanged)[1]
+        if misfit_m > EXCHANGED * rms:
+            text = message(
+                "stations_exchanged",
+                "the hits fit a tank with the stations of {one!r} and {other!r} exchanged (rms"
+                " {other_mm:.1f} mm for {rms_mm:.1f} mm)",
+                one=names[one],
+                other=names[other],
+                other_mm=1000 * rms,
+                rms_mm=1000 * misfit_m,
+            )
+            row = hits.setups[names[one]].row
+            raise InputError(Problem("setups.csv", text, row, "station"))
 
 
 def sees_all_around(own):
@@ -115,7 +183,9 @@ def _centre(own, nominal_m, is_inside):
 
 
 def _fitted(poses, own, pose, untied, axis):
-    """The poses after least squares on a leaning surface of revolution."""
+    """The poses after least squares on a leaning surface of revolution, and the rms of the hits
+    about it, none more than FAR_SDS of a wall's, m.
+    """
     z = poses.xyz_m[pose, 2] + own[:, 2]
     middle = z.mean()
     order = np.argsort(z, kind="stable")
@@ -162,7 +232,8 @@ def _fitted(poses, own, pose, untied, axis):
         moved += change[: free + 4]
         if np.abs(change[: free + 4]).max() < 1e-7:
             break
-    return replace(poses, xyz_m=xyz, orientation_rad=zero)
+    misfit = np.sqrt(np.mean(np.minimum(np.abs(off), FAR_SDS * WALL_SD_M) ** 2))
+    return replace(poses, xyz_m=xyz, orientation_rad=zero), float(misfit)
 
 
 def _start(away, own):

@@ -548,6 +548,43 @@ def test_set_ups_that_the_wall_alone_ties(tmp_path, control):
 
 
 @pytest.mark.slow
+def test_untied_set_ups_walked_anticlockwise(tmp_path):
+    """Property: nobody said where they stood; the lean says which way round they follow."""
+    clockwise = run(tmp_path / "a", arc_parts(setups=5, seed=2, control=False))
+    parts = arc_parts(setups=5, seed=2, control=False)
+    heading, *rows = parts.tables["wall_hits"]
+    parts.tables["wall_hits"] = [heading, *sorted(rows, key=lambda row: row[0], reverse=True)]
+    other = run(tmp_path / "b", parts)
+    assert other.table.volume_m3[-1] == pytest.approx(clockwise.table.volume_m3[-1], rel=1e-5)
+    assert np.hypot(*other.wall.shell.slope) == pytest.approx(
+        np.hypot(*clockwise.wall.shell.slope), abs=2e-6
+    )
+
+
+def mirrored(parts):
+    for row in parts.tables["control"][1:]:
+        row[1] *= -1.0
+
+
+def exchanged(parts):
+    rows = parts.tables["setups"]
+    rows[2][1], rows[4][1] = rows[4][1], rows[2][1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("slip", "told"), [(mirrored, "control.csv"), (exchanged, "setups.csv")])
+def test_stations_in_another_order_are_refused(tmp_path, slip, told):
+    parts = arc_parts(setups=6, seed=2)
+    slip(parts)
+    with pytest.raises(tankcal.InputError) as refused:
+        run(tmp_path, parts)
+    (problem,) = refused.value.problems
+    assert problem.file == told
+    assert slip.__name__ in problem.expected.code
+    assert told == "control.csv" or {"'S1'", "'S3'"} <= set(str(problem).split())
+
+
+@pytest.mark.slow
 def test_untied_set_ups_start_from_certified_distances(tmp_path):
     """A constant of the certificate, such as that of a reflector that was set: the same tank."""
     first = run(tmp_path / "a", arc_parts(seed=3))
