@@ -16,9 +16,13 @@ import numpy as np
 
 PANEL = 64  # columns of Y whose products with those after them are taken at once
 TOGETHER = 32  # blocks with the same columns that are eliminated at once
+LEAVING = 4  # blocks whose products take as long as spreading those of a series over the columns
 COMPILED = (
     "_follow",
     "_mark",
+    "_list_series",
+    "_work",
+    "_join_series",
     "_list_columns",
     "_find_places",
     "_is_alike",
@@ -51,43 +55,79 @@ def _follow(columns, spare, follows):
             follows[a] &= (right == columns[i, a] + 1) & (right != spare)
 
 
-def _list_columns(together, reduced, starts):
-    """columns, ends and alike of a Plan, by the marks (blocks, columns); starts is filled."""
+def _list_series(together):
+    """alike of a Plan, by the marks (blocks, columns)."""
     blocks = len(together)
+    alike, series = np.zeros(blocks + 1, dtype=np.int64), 0
     for o in range(blocks):
+        differing = 0
+        if o > 0:
+            for c in range(together.shape[1]):
+                differing += together[o, c] != together[o - 1, c]
+        if o == 0 or differing > 0:
+            alike[series] = o
+            series += 1
+    alike[series] = blocks
+    return alike[: series + 1].copy()
+
+
+def _join_series(together, alike):
+    """Neighbouring series get the columns of both where one series is less work than two.
+
+    The marks (blocks, columns) are changed; returns alike of what there is then. The columns that a
+    block gets hold zeros: these are multiplied sooner than many small products are spread.
+    """
+    joined, series = alike.copy(), 0
+    for k in range(1, len(alike) - 1):
+        first, begin, end = joined[series], alike[k], alike[k + 1]
+        both = together[first] | together[begin]
+        apart = _work(begin - first, together[first].sum())
+        apart += _work(end - begin, together[begin].sum())
+        if _work(end - first, both.sum()) <= apart:
+            together[first], together[begin] = both, both
+        else:
+            series += 1
+            joined[series] = begin
+    joined = joined[: min(series + 2, len(alike))].copy()
+    joined[-1] = alike[-1]
+    for k in range(len(joined) - 1):
+        together[joined[k] : joined[k + 1]] = together[joined[k]]
+    return joined
+
+
+def _work(blocks, columns):
+    """What a series of blocks costs in _eliminate, in products of numbers for a third of a row."""
+    return columns * columns * (blocks + LEAVING * ((blocks + TOGETHER - 1) // TOGETHER))
+
+
+def _list_columns(together, reduced, alike, starts):
+    """columns and ends of a Plan, by the marks (blocks, columns); starts is filled."""
+    for k in range(len(alike) - 1):
         count = 0
         for c in range(reduced):
-            count += together[o, c]
-        starts[o + 1] = starts[o] + count
-    columns = np.empty(starts[blocks], dtype=np.int32)
-    ends, alike = np.empty(starts[blocks] + 1, dtype=np.int64), np.empty(blocks + 1, dtype=np.int64)
-    runs, series, before = 0, 0, 0
-    for o in range(blocks):
-        differing, first = 0, starts[o]
-        if o > 0:
-            for c in range(reduced):
-                differing += together[o, c] != together[o - 1, c]
-        if o > 0 and differing == 0:  # as the one before
-            length = starts[o + 1] - first
-            for a in range(first, first + length):
-                columns[a] = columns[a - length]
-            count = runs - before
-            for run in range(runs, runs + count):
-                ends[run] = ends[run - count] + length
-            before, runs = runs, runs + count
-            continue
-        alike[series] = o
-        series += 1
+            count += together[alike[k], c]
+        for o in range(alike[k], alike[k + 1]):
+            starts[o + 1] = starts[o] + count
+    columns, runs = np.empty(starts[-1], dtype=np.int32), 0
+    ends = np.empty(starts[-1] + 1, dtype=np.int64)
+    for k in range(len(alike) - 1):
+        first, others = starts[alike[k]], alike[k + 1] - alike[k] - 1
         at, last, before = first, -2, runs
         for c in range(reduced):
-            if together[o, c]:
+            if together[alike[k], c]:
                 if c != last + 1:
                     ends[runs] = at
                     runs += 1
                 columns[at] = c
                 at, last = at + 1, c
-    ends[runs], alike[series] = starts[blocks], blocks
-    return columns, ends[: runs + 1].copy(), alike[: series + 1].copy()
+        length, count = at - first, runs - before
+        for a in range(at, at + others * length):
+            columns[a] = columns[a - length]
+        for run in range(runs, runs + others * count):
+            ends[run] = ends[run - count] + length
+        runs += others * count
+    ends[runs] = starts[-1]
+    return columns, ends[: runs + 1].copy()
 
 
 def _find_places(block, first, reduced, starts, columns, place):

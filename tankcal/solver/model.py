@@ -3,7 +3,8 @@
 The unknowns are numbered so that the reduced ones come first and the eliminated blocks, three
 unknowns each, come last. No row touches two blocks. For each block the plan keeps the sorted list
 of reduced columns that occur together with it: its part of the normal matrix is stored for these
-columns only, in three rows, one an unknown of the block ("wide").
+columns only, in three rows, one an unknown of the block ("wide"). Neighbouring blocks whose columns
+are nearly the same are given those of each other, too, so that they are eliminated together.
 """
 
 from collections.abc import Callable
@@ -232,6 +233,9 @@ def _structure(reduced, blocks, raw):
         if block is not None:
             _mark(together, block, cuts, first)
     together[:, reduced] = False
+    changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
+    alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
+    alike = loops._join_series(together, alike)
     met = np.flatnonzero(together)
     starts = np.searchsorted(met, np.arange(blocks + 1) * (reduced + 1))
     owner = np.repeat(np.arange(blocks, dtype=np.int32), np.diff(starts))
@@ -240,8 +244,6 @@ def _structure(reduced, blocks, raw):
     place.ravel()[met] = np.arange(len(met), dtype=np.int32)
     places = [None if one[3] is None else place[one[3][:, None], one[-1]] for one in raw]
     ends = np.flatnonzero(np.diff(met, prepend=-2, append=-2) != 1)
-    changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
-    alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
     return starts, columns, ends, alike, places
 
 
@@ -265,8 +267,10 @@ def _structure_by_loops(reduced, blocks, raw):
     for _, _, _, block, cuts, first in raw:
         if block is not None:
             run._mark(block, first, cuts, together)
+    together[:, reduced] = False
+    alike = run._join_series(together, run._list_series(together))
     starts = np.zeros(blocks + 1, dtype=int)
-    columns, ends, alike = run._list_columns(together, reduced, starts)
+    columns, ends = run._list_columns(together, reduced, alike, starts)
     places = []
     for _, _, _, block, _, first in raw:
         place = None if block is None else np.empty(first.shape, dtype=np.int32)

@@ -91,6 +91,29 @@ def test_plans_by_loops_are_those_of_arrays(monkeypatch):
         assert one.place is None or (one.place == other.place).all()
 
 
+def test_blocks_eliminated_together_give_what_they_give_one_by_one(monkeypatch):
+    """Second method: each block with its own columns only."""
+    rng, reduced, blocks = np.random.default_rng(11), 15, 12
+    groups = groups_of(rng, reduced, blocks)
+    rows = [rng.normal(size=(len(group.columns), 1, group.columns.shape[1])) for group in groups]
+    found = []
+    for join in (loops._join_series, lambda together, alike: alike):
+        monkeypatch.setattr(loops, "_join_series", join)
+        plan = model.plan(reduced, blocks, groups)
+        normals = Normals.zero(plan)
+        normals.v[:, [0, 2, 5]] = 1.0
+        for batch in plan.batches:
+            jac = batch.of(rows[batch.group])
+            elimination.add_rows(plan, batch, jac[:, :, 0] + 0.5, jac, normals)
+        assert elimination.eliminate(plan, normals, 1e-3, 1e-12) == -1
+        back = elimination.back_substitute(plan, normals, np.arange(15.0))
+        found.append((len(plan.alike), normals.t[:-1, :-1], normals.g[:-1], back))
+    (joined, *of_joined), (alone, *of_single) = found
+    assert joined < alone
+    for one, other in zip(of_joined, of_single, strict=True):
+        assert one == pytest.approx(other, abs=1e-11)
+
+
 @pytest.mark.parametrize("panel", [4, loops.PANEL])
 def test_elimination_by_loops_is_that_of_arrays(panel, monkeypatch):
     rng, reduced, blocks = np.random.default_rng(7), 15, 12
