@@ -31,7 +31,8 @@ def add_rows(plan, batch, w, jac, normals):
         np.add.at(normals.wide, plan.entries[batch.places], np.einsum("nmk,nma->nka", f, e))
     np.add.at(normals.g, columns, np.einsum("nmk,nm->nk", f, w))
     once = np.triu(np.ones((f.shape[2],) * 2)) * np.einsum("nma,nmb->nab", f, f)
-    np.add.at(normals.t, (columns[:, :, None], columns[:, None, :]), once)
+    pair = columns[:, :, None], columns[:, None, :]
+    np.add.at(normals.t, (np.minimum(*pair), np.maximum(*pair)), once)
 
 
 def eliminate(plan, normals, damping, smallest):

@@ -5,8 +5,7 @@ For the rows of a batch with derivatives E by their block and F by reduced unkno
     V += E'E,   wide += F'E,   S += F'F,   b += E'w,   g += F'w
 
 and for each block, V = L L', the wide part becomes Y = wide L^-T and b becomes y = L^-1 b, so that
-the reduced equations are S - Y Y' and g - Y y. S is kept as a matrix T in which each pair of
-unknowns stands once: S = T + T' - diag T.
+the reduced equations are S - Y Y' and g - Y y. Of S the upper half is kept, T.
 
 In the innermost loops places are counted without a sign (np.uintp): numba tests at each number
 whether one that might be negative is counted from the end.
@@ -168,8 +167,12 @@ def _add_squares(w, jac, skip, first, cuts, t, g):
                 g[to + a] += product[skip + a]
                 for other in range(one, runs):
                     by = first[begin, other] - cuts[other]
-                    for q in range(max(a, cuts[other]), cuts[other + 1]):
-                        t[to + a, by + q] += square[skip + a, skip + q]
+                    if first[begin, other] >= first[begin, one]:
+                        for q in range(max(a, cuts[other]), cuts[other + 1]):
+                            t[to + a, by + q] += square[skip + a, skip + q]
+                    else:
+                        for q in range(cuts[other], cuts[other + 1]):
+                            t[by + q, to + a] += square[skip + a, skip + q]
 
 
 def _is_alike(first, i, j):
