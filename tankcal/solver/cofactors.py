@@ -55,7 +55,9 @@ class Factor:
             scaled = self.tangent.in_null_space(scaled)
         if not scaled.size:
             return scaled
-        return scipy.linalg.blas.dtrsm(1.0, self.lower, scaled.T, side=1, lower=1, trans_a=1).T
+        right, lower, transposed = 1, 1, 1
+        blas = scipy.linalg.blas
+        return blas.dtrsm(1.0, self.lower, scaled.T, right, lower, transposed, overwrite_b=1).T
 
     def solved(self, columns):
         """S^-1 columns, columns (nr,) or (nr, k)."""

@@ -39,7 +39,7 @@ def test_image_points_side_by_side_are_those_of_arrays(form, in_ideal):
     photo[-20:] = rng.integers(0, PHOTOS, 20)  # some in no order
     point, xy_mm = rng.integers(0, POINTS, RAYS), rng.uniform(-15, 15, (RAYS, 2))
     given = (
-        xyz_m, centres_m, rotation, interior, tuple(form.numbers),
+        xyz_m, centres_m, rotation, interior, form.numbers,
         form.convention == "distortion_of_ideal", point, photo, xy_mm,
         rng.uniform(100, 300, (RAYS, 2)), active,
     )  # fmt: skip
