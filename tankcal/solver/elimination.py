@@ -31,8 +31,7 @@ def add_rows(plan, batch, w, jac, normals):
         np.add.at(normals.wide, plan.entries[batch.places], np.einsum("nmk,nma->nka", f, e))
     np.add.at(normals.g, columns, np.einsum("nmk,nm->nk", f, w))
     once = np.triu(np.ones((f.shape[2],) * 2)) * np.einsum("nma,nmb->nab", f, f)
-    pair = columns[:, :, None], columns[:, None, :]
-    np.add.at(normals.t, (np.minimum(*pair), np.maximum(*pair)), once)
+    np.add.at(normals.t, (columns[:, :, None], columns[:, None, :]), once)
 
 
 def eliminate(plan, normals, damping, smallest):
@@ -42,6 +41,8 @@ def eliminate(plan, normals, damping, smallest):
             normals.v, normals.wide, normals.b, plan.starts, plan.columns, plan.runs, plan.ends,
             plan.alike, normals.t, normals.g, damping, smallest,
         )  # fmt: skip
+    below = np.tril(normals.t, -1)  # add_rows has put each pair somewhere: into the upper half
+    normals.t += below.T - below
     v = np.zeros((plan.blocks, 3, 3))
     v[:, *np.tril_indices(3)] = normals.v
     v += np.tril(v, -1).transpose(0, 2, 1)
@@ -103,7 +104,7 @@ def block_cofactors(plan, normals, inverse):
     cross[-1] = 0.0
     if is_worth_compiling(plan.rows):
         compile_functions(loops, loops.COMPILED)._cofactors(
-            normals.v, normals.wide, plan.starts, plan.columns, plan.runs, plan.ends,
+            normals.v, normals.wide, plan.starts, plan.columns, plan.runs, plan.ends, plan.alike,
             inverse, cross, out,
         )  # fmt: skip
         return out, cross

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tankcal.solver import loops
+from tankcal.solver import series
 from tankcal.solver.compiled import compile_functions, is_worth_compiling
 
 
@@ -188,7 +188,7 @@ class Plan:
     columns           (t,) reduced columns of all blocks, ascending in each
     ends              (s + 1,) where in `columns` runs of neighbouring columns begin, t at the end
     runs              (nb + 1,) where in `ends` each block begins
-    alike             where series of neighbouring blocks with the same columns begin; nb at the end
+    alike             where series of blocks with the same columns begin, see series; nb at the end
     """
 
     reduced: int
@@ -235,7 +235,7 @@ def _structure(reduced, blocks, raw):
     together[:, reduced] = False
     changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
     alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
-    alike = loops._join_series(together, alike)
+    alike = series._join_series(together, alike)
     met = np.flatnonzero(together)
     starts = np.searchsorted(met, np.arange(blocks + 1) * (reduced + 1))
     owner = np.repeat(np.arange(blocks, dtype=np.int32), np.diff(starts))
@@ -262,7 +262,7 @@ def _mark(together, block, cuts, first):
 
 def _structure_by_loops(reduced, blocks, raw):
     """The same by compiled loops."""
-    run = compile_functions(loops, loops.COMPILED)
+    run = compile_functions(series, series.COMPILED)
     together = np.zeros((blocks, reduced + 1), dtype=bool)
     for _, _, _, block, cuts, first in raw:
         if block is not None:
@@ -290,7 +290,7 @@ def _cuts(columns, spare):
         return np.arange(k + 1)
     follows = np.ones(k - 1, dtype=bool)
     if is_worth_compiling(n):
-        run = compile_functions(loops, loops.COMPILED)
+        run = compile_functions(series, series.COMPILED)
         run._follow(np.ascontiguousarray(columns), spare, follows)
     else:
         for start in range(0, n, AT_ONCE):

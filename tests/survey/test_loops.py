@@ -8,7 +8,7 @@ import pytest
 from tankcal.camera import imaging
 from tankcal.camera.model import Form
 from tankcal.geometry.rotations import rotation_of_view
-from tankcal.solver import Group, elimination, loops, model
+from tankcal.solver import Group, elimination, loops, model, series
 from tankcal.solver.model import Normals
 
 PHOTOS, POINTS, RAYS = 3, 40, 210  # more of a photo than are computed side by side
@@ -78,7 +78,7 @@ def test_plans_by_loops_are_those_of_arrays(monkeypatch):
     groups = groups_of(np.random.default_rng(3), reduced, blocks)
     of_arrays = model.plan(reduced, blocks, groups)
     monkeypatch.setattr(model, "is_worth_compiling", lambda rows=0: True)
-    plain = SimpleNamespace(**{name: vars(loops)[name] for name in loops.COMPILED})
+    plain = SimpleNamespace(**{name: vars(series)[name] for name in series.COMPILED})
     monkeypatch.setattr(model, "compile_functions", lambda module, names: plain)
     found = model.plan(reduced, blocks, groups)
     assert len(found.columns) > 3 * blocks
@@ -97,8 +97,8 @@ def test_blocks_eliminated_together_give_what_they_give_one_by_one(monkeypatch):
     groups = groups_of(rng, reduced, blocks)
     rows = [rng.normal(size=(len(group.columns), 1, group.columns.shape[1])) for group in groups]
     found = []
-    for join in (loops._join_series, lambda together, alike: alike):
-        monkeypatch.setattr(loops, "_join_series", join)
+    for join in (series._join_series, lambda together, alike: alike):
+        monkeypatch.setattr(series, "_join_series", join)
         plan = model.plan(reduced, blocks, groups)
         normals = Normals.zero(plan)
         normals.v[:, [0, 2, 5]] = 1.0
@@ -123,11 +123,14 @@ def test_elimination_by_loops_is_that_of_arrays(panel, monkeypatch):
     first.v[:] = (root @ root.transpose(0, 2, 1))[:, *np.tril_indices(3)]
     for part in (first.wide[:-1], first.b, first.t[:-1, :-1], first.g[:-1]):
         part[:] = rng.normal(size=part.shape)
+    first.t[:] = np.triu(first.t)
     for name in vars(first):
         getattr(second, name)[:] = getattr(first, name)
     assert elimination.eliminate(plan, first, 1e-3, 1e-12) == -1
     step = rng.normal(size=reduced)
     blocks_of_arrays = elimination.back_substitute(plan, first, step)
+    inverse = np.cov(rng.normal(size=(reduced, 2 * reduced)))
+    of_arrays = elimination.block_cofactors(plan, first, inverse)
     monkeypatch.setattr(loops, "PANEL", panel)
     monkeypatch.setattr(elimination, "is_worth_compiling", lambda rows=0: True)
     plain = SimpleNamespace(**{name: vars(loops)[name] for name in loops.COMPILED})
@@ -137,6 +140,10 @@ def test_elimination_by_loops_is_that_of_arrays(panel, monkeypatch):
         assert getattr(second, name) == pytest.approx(getattr(first, name), abs=1e-12), name
     found = elimination.back_substitute(plan, second, step)
     assert found == pytest.approx(blocks_of_arrays, abs=1e-12)
+    for one, other in zip(
+        elimination.block_cofactors(plan, second, inverse), of_arrays, strict=True
+    ):
+        assert one == pytest.approx(other, abs=1e-11)
 
 
 def test_the_wide_part_has_three_rows_a_block():
