@@ -54,14 +54,16 @@ def _add_squares(w, jac, skip, first, cuts, t, g):
             to = first[begin, one] - cuts[one]
             for a in range(cuts[one], cuts[one + 1]):
                 g[to + a] += product[skip + a]
-                for other in range(one, runs):
-                    by = first[begin, other] - cuts[other]
-                    if first[begin, other] >= first[begin, one]:
+            for other in range(one, runs):
+                by = first[begin, other] - cuts[other]
+                if by + cuts[other] >= to + cuts[one]:
+                    for a in range(cuts[one], cuts[one + 1]):
                         for q in range(max(a, cuts[other]), cuts[other + 1]):
                             t[to + a, by + q] += square[skip + a, skip + q]
-                    else:
-                        for q in range(cuts[other], cuts[other + 1]):
-                            t[by + q, to + a] += square[skip + a, skip + q]
+                else:
+                    for q in range(cuts[other], cuts[other + 1]):
+                        for a in range(cuts[one], cuts[one + 1]):
+                            t[by + q, to + a] += square[skip + q, skip + a]
 
 
 def _is_alike(first, i, j):
