@@ -72,9 +72,9 @@ class Form:
 
     @property
     def numbers(self):
-        """(8,) side (0, +1, -1), the six affinity switches, R0^2: what the formulas take."""
-        side = CONVENTIONS[self.convention]
-        return np.array([side, *AFFINITIES[self.affinity], self.radial_balance_mm**2])
+        """Eight: side (0, +1, -1), the six affinity switches, R0^2: what the formulas take."""
+        side, balance = CONVENTIONS[self.convention], float(self.radial_balance_mm)
+        return side, *AFFINITIES[self.affinity], balance**2
 
 
 def correct_image_points(xy_mm, interior, form):
@@ -107,8 +107,7 @@ def correct_image_points(xy_mm, interior, form):
     if form.convention != "distortion_of_ideal":
         dx, dy = distort(x, y, q, numbers)[:2]
         return np.column_stack([x + numbers[0] * dx, y + numbers[0] * dy])
-    numbers[0] = 1.0
-    return np.column_stack(undistorted_by(x, y, q, numbers))
+    return np.column_stack(undistorted_by(x, y, q, (1.0, *numbers[1:])))
 
 
 def distort_image_points(ideal_mm, interior, form):

@@ -53,7 +53,11 @@ class Factor:
         scaled = columns * self.scale[:, None]
         if self.tangent is not None:
             scaled = self.tangent.in_null_space(scaled)
-        return scipy.linalg.solve_triangular(self.lower, scaled, lower=True, check_finite=False)
+        if not scaled.size:
+            return scaled
+        right, lower, transposed = 1, 1, 1
+        blas = scipy.linalg.blas
+        return blas.dtrsm(1.0, self.lower, scaled.T, right, lower, transposed, overwrite_b=1).T
 
     def solved(self, columns):
         """S^-1 columns, columns (nr,) or (nr, k)."""
@@ -188,19 +192,21 @@ class Cofactors:
 
     def _through_reduced(self, columns):
         """How each unknown follows the reduced ones: (nr, k), d unknown / d reduced."""
-        nr, starts = self.plan.reduced, self.plan.starts
-        out = np.zeros((nr, len(columns)), order="F")
+        nr, starts, wide = self.plan.reduced, self.plan.starts, self.factor.normals.wide
+        out = np.zeros((nr, len(columns)))
         own = np.flatnonzero(columns < nr)
         out[columns[own], own] = 1.0
         eliminated = np.flatnonzero(columns >= nr)
         block, axis = np.divmod(columns[eliminated] - nr, 3)
-        count = starts[block + 1] - starts[block]
-        to = np.repeat(eliminated, count)
-        first = np.repeat(starts[block] - np.cumsum(count) + count, count)
-        entry = first + np.arange(len(to))
-        inverse = np.repeat(self.inverse_roots[block, :, axis], count, axis=0)
-        wide = self.factor.normals.wide[self.plan.entries[entry]]
-        out[self.plan.columns[entry], to] = -np.einsum("ti,ti->t", wide, inverse)
+        first, count = starts[block], np.diff(starts)[block]
+        entry = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
+        length, place = np.repeat(count, count), np.repeat(2 * first, count) + entry
+        change = np.zeros(len(entry))
+        for root in self.inverse_roots[block, :, axis].T:  # one for each row of the wide part
+            change -= np.repeat(root, count) * wide[place]
+            place += length
+        to = self.plan.columns[entry] * np.int64(len(columns)) + np.repeat(eliminated, count)
+        out.reshape(-1)[to] = change
         return out
 
     @cached_property

@@ -41,7 +41,11 @@ def _asked_for():
     return os.environ.get("TANKCAL_COMPILED", "patient")
 
 
-_SOURCES = (Path(__file__).with_name("loops.py"), Path(__file__).parents[1] / "camera/imaging.py")
+_SOURCES = (
+    Path(__file__).with_name("loops.py"),
+    Path(__file__).with_name("series.py"),
+    Path(__file__).parents[1] / "camera/imaging.py",
+)
 _MARK = Path(__file__).parent / "__pycache__" / "kernels.txt"
 
 

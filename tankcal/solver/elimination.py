@@ -41,6 +41,8 @@ def eliminate(plan, normals, damping, smallest):
             normals.v, normals.wide, normals.b, plan.starts, plan.columns, plan.runs, plan.ends,
             plan.alike, normals.t, normals.g, damping, smallest,
         )  # fmt: skip
+    below = np.tril(normals.t, -1)  # add_rows has put each pair somewhere: into the upper half
+    normals.t += below.T - below
     v = np.zeros((plan.blocks, 3, 3))
     v[:, *np.tril_indices(3)] = normals.v
     v += np.tril(v, -1).transpose(0, 2, 1)
@@ -102,7 +104,7 @@ def block_cofactors(plan, normals, inverse):
     cross[-1] = 0.0
     if is_worth_compiling(plan.rows):
         compile_functions(loops, loops.COMPILED)._cofactors(
-            normals.v, normals.wide, plan.starts, plan.columns, plan.runs, plan.ends,
+            normals.v, normals.wide, plan.starts, plan.columns, plan.runs, plan.ends, plan.alike,
             inverse, cross, out,
         )  # fmt: skip
         return out, cross

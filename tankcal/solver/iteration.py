@@ -227,18 +227,16 @@ class _Work:
         And what the conditions hold against: see Tangent.square.
         """
         nr = self.plan.reduced
-        s = self.normals.t[:nr, :nr] + self.normals.t[:nr, :nr].T
-        corner = np.einsum("ii->i", s)
-        corner *= 0.5
-        corner[untouched] = 1.0
-        s *= scale
+        s = self.normals.t[:nr, :nr] * scale  # its upper half
         s *= scale[:, None]
+        corner = np.einsum("ii->i", s)
+        corner[untouched] = 1.0
         corner += damping
         if held is not None:
             s += held @ held.T
         reaction_part = None
         if tangent is not None:
-            s, reaction_part = tangent.square(s)
+            s, reaction_part = tangent.square(np.triu(s) + np.triu(s, 1).T)
         lower, info = scipy.linalg.lapack.dpotrf(s.T, lower=1, clean=0, overwrite_a=1)
         sound = (
             not info and find_determined(lower.diagonal(), self.rows.count, of_normals=True).all()

@@ -5,8 +5,7 @@ For the rows of a batch with derivatives E by their block and F by reduced unkno
     V += E'E,   wide += F'E,   S += F'F,   b += E'w,   g += F'w
 
 and for each block, V = L L', the wide part becomes Y = wide L^-T and b becomes y = L^-1 b, so that
-the reduced equations are S - Y Y' and g - Y y. S is kept as a matrix T in which each pair of
-unknowns stands once: S = T + T' - diag T.
+the reduced equations are S - Y Y' and g - Y y. Of S the upper half is kept, T.
 
 In the innermost loops places are counted without a sign (np.uintp): numba tests at each number
 whether one that might be negative is counted from the end.
@@ -15,12 +14,7 @@ whether one that might be negative is counted from the end.
 import numpy as np
 
 PANEL = 64  # columns of Y whose products with those after them are taken at once
-TOGETHER = 32  # blocks with the same columns that are eliminated at once
 COMPILED = (
-    "_follow",
-    "_mark",
-    "_list_columns",
-    "_find_places",
     "_is_alike",
     "_add_squares",
     "_add_blocks",
@@ -28,81 +22,15 @@ COMPILED = (
     "_forward",
     "_forward_all",
     "_leave",
+    "_sizes",
     "_eliminate",
     "_back",
+    "_inverse_root",
+    "_among",
+    "_own_cofactors",
     "_cofactors",
     "_leverage",
 )
-
-
-def _mark(block, first, cuts, together):
-    """Mark (blocks, columns) where rows with a block have columns: first (n, s) of runs."""
-    for i in range(len(block)):
-        for run in range(len(cuts) - 1):
-            for step in range(cuts[run + 1] - cuts[run]):
-                together[block[i], first[i, run] + step] = True
-
-
-def _follow(columns, spare, follows):
-    """follows (k - 1,) stays True where in all rows (n, k) a column is the one after its left."""
-    for i in range(len(columns)):
-        for a in range(len(follows)):
-            right = columns[i, a + 1]
-            follows[a] &= (right == columns[i, a] + 1) & (right != spare)
-
-
-def _list_columns(together, reduced, starts):
-    """columns, ends and alike of a Plan, by the marks (blocks, columns); starts is filled."""
-    blocks = len(together)
-    for o in range(blocks):
-        count = 0
-        for c in range(reduced):
-            count += together[o, c]
-        starts[o + 1] = starts[o] + count
-    columns = np.empty(starts[blocks], dtype=np.int32)
-    ends, alike = np.empty(starts[blocks] + 1, dtype=np.int64), np.empty(blocks + 1, dtype=np.int64)
-    runs, series, before = 0, 0, 0
-    for o in range(blocks):
-        differing, first = 0, starts[o]
-        if o > 0:
-            for c in range(reduced):
-                differing += together[o, c] != together[o - 1, c]
-        if o > 0 and differing == 0:  # as the one before
-            length = starts[o + 1] - first
-            for a in range(first, first + length):
-                columns[a] = columns[a - length]
-            count = runs - before
-            for run in range(runs, runs + count):
-                ends[run] = ends[run - count] + length
-            before, runs = runs, runs + count
-            continue
-        alike[series] = o
-        series += 1
-        at, last, before = first, -2, runs
-        for c in range(reduced):
-            if together[o, c]:
-                if c != last + 1:
-                    ends[runs] = at
-                    runs += 1
-                columns[at] = c
-                at, last = at + 1, c
-    ends[runs], alike[series] = starts[blocks], blocks
-    return columns, ends[: runs + 1].copy(), alike[: series + 1].copy()
-
-
-def _find_places(block, first, reduced, starts, columns, place):
-    """Where the first column of each run and the block meet in the wide part; see Batch.place."""
-    for i in range(len(block)):
-        for run in range(first.shape[1]):
-            c = first[i, run]
-            low, high = starts[block[i]], starts[block[i] + 1]
-            while low < high:  # the first that is not below it
-                middle = (low + high) // 2
-                if columns[middle] < c:
-                    low = middle + 1
-                else:
-                    high = middle
-            place[i, run] = starts[-1] if c == reduced else low
 
 
 def _add_squares(w, jac, skip, first, cuts, t, g):
@@ -126,10 +54,16 @@ def _add_squares(w, jac, skip, first, cuts, t, g):
             to = first[begin, one] - cuts[one]
             for a in range(cuts[one], cuts[one + 1]):
                 g[to + a] += product[skip + a]
-                for other in range(one, runs):
-                    by = first[begin, other] - cuts[other]
-                    for q in range(max(a, cuts[other]), cuts[other + 1]):
-                        t[to + a, by + q] += square[skip + a, skip + q]
+            for other in range(one, runs):
+                by = first[begin, other] - cuts[other]
+                if by + cuts[other] >= to + cuts[one]:
+                    for a in range(cuts[one], cuts[one + 1]):
+                        for q in range(max(a, cuts[other]), cuts[other + 1]):
+                            t[to + a, by + q] += square[skip + a, skip + q]
+                else:
+                    for q in range(cuts[other], cuts[other + 1]):
+                        for a in range(cuts[one], cuts[one + 1]):
+                            t[by + q, to + a] += square[skip + q, skip + a]
 
 
 def _is_alike(first, i, j):
@@ -252,36 +186,39 @@ def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, sm
 
     Blocks alike[k] to alike[k + 1] have the same columns: they leave t together.
     """
-    longest = 0
-    for o in range(len(b)):
-        longest = max(longest, starts[o + 1] - starts[o])
-    store, square = np.empty(longest), np.empty((longest + 6 * TOGETHER) * longest)
+    longest, most = _sizes(starts, alike)
+    store, square = np.empty(longest), np.empty((longest + 6 * most) * longest)
     for k in range(len(alike) - 1):
-        first = starts[alike[k]]
-        n = starts[alike[k] + 1] - first
-        mine, right = columns[first : first + n], store[:n]
-        edges = ends[runs[alike[k]] : runs[alike[k] + 1] + 1]
+        begin, end, first = alike[k], alike[k + 1], starts[alike[k]]
+        n = starts[begin + 1] - first
+        y = wide[3 * first : 3 * starts[end]].reshape((3 * (end - begin), n))
+        right = store[:n]
         right[:] = 0.0
-        for begin in range(alike[k], alike[k + 1], TOGETHER):
-            end = min(begin + TOGETHER, alike[k + 1])
-            y = wide[3 * starts[begin] : 3 * starts[end]].reshape((3 * (end - begin), n))
-            for o in range(begin, end):
-                if not _root(v[o], damping, smallest):
-                    return o
-                _forward(v[o], b[o])
-                _forward_all(v, b, o, wide, 3 * starts[o], n, right)
-            _leave(t, mine, edges, first, y, square)
+        for o in range(begin, end):
+            if not _root(v[o], damping, smallest):
+                return o
+            _forward(v[o], b[o])
+            _forward_all(v, b, o, wide, 3 * starts[o], n, right)
+        _leave(
+            t, columns[first : first + n], ends[runs[begin] : runs[begin + 1] + 1], first, y, square
+        )
         for a in range(n):
-            g[mine[a]] -= right[a]
+            g[columns[first + a]] -= right[a]
     return -1
+
+
+def _sizes(starts, alike):
+    """The most columns of a block, and the most blocks of a series."""
+    longest, most = 0, 0
+    for k in range(len(alike) - 1):
+        longest = max(longest, starts[alike[k] + 1] - starts[alike[k]])
+        most = max(most, alike[k + 1] - alike[k])
+    return longest, most
 
 
 def _back(v, wide, b, starts, columns, alike, reduced, out):
     """L^-T (b + Y' reduced) of each block into out (nb, 3)."""
-    longest = 0
-    for o in range(len(b)):
-        longest = max(longest, starts[o + 1] - starts[o])
-    store = np.empty(longest)
+    store = np.empty(_sizes(starts, alike)[0])
     for k in range(len(alike) - 1):
         first = starts[alike[k]]
         n = starts[alike[k] + 1] - first
@@ -301,51 +238,63 @@ def _back(v, wide, b, starts, columns, alike, reduced, out):
             out[o, 0], out[o, 1], out[o, 2] = x0, x1, x2
 
 
-def _cofactors(v, wide, starts, columns, runs, ends, inverse, cross, out):
-    longest = 0
-    for o in range(len(v)):
-        longest = max(longest, starts[o + 1] - starts[o])
-    z = np.empty((3, longest))
-    for o in range(len(v)):
-        first, n = starts[o], starts[o + 1] - starts[o]
-        c = columns[first : first + n]
-        i00, i11, i22 = 1.0 / v[o, 0], 1.0 / v[o, 2], 1.0 / v[o, 5]
-        i10 = -v[o, 1] * i00 * i11
-        i21 = -v[o, 4] * i11 * i22
-        i20 = -(v[o, 3] * i00 + v[o, 4] * i10) * i22
+def _inverse_root(v, root):
+    """L^-1 of a block into the lower half of root (3, 3)."""
+    root[0, 0], root[1, 1], root[2, 2] = 1.0 / v[0], 1.0 / v[2], 1.0 / v[5]
+    root[1, 0], root[2, 1] = -v[1] * root[0, 0] * root[1, 1], -v[4] * root[1, 1] * root[2, 2]
+    root[2, 0] = -(v[3] * root[0, 0] + v[4] * root[1, 0]) * root[2, 2]
+
+
+def _among(inverse, columns, runs, first, q):
+    """The part q (n, n) of a matrix of some columns (n,), in runs of neighbours."""
+    for a in range(len(columns)):
+        line = inverse[columns[a]]
+        for run in range(len(runs) - 1):
+            to, by = runs[run] - first, columns[runs[run] - first]
+            for step in range(runs[run + 1] - runs[run]):
+                q[a, to + step] = line[by + step]
+
+
+def _cofactors(v, wide, starts, columns, runs, ends, alike, inverse, cross, out):
+    """With Z = Y L^-1 and Q from inverse: -Q Z into cross, L^-T L^-1 + Z'Q Z into out."""
+    longest, most = _sizes(starts, alike)
+    square, root = np.empty(longest * longest), np.zeros((3, 3))
+    left, right = np.empty(3 * most * longest), np.empty(3 * most * longest)
+    for k in range(len(alike) - 1):
+        begin, end, first = alike[k], alike[k + 1], starts[alike[k]]
+        n, rows = starts[begin + 1] - first, 3 * (end - begin)
+        q = square[: n * n].reshape((n, n))
+        z, x = left[: rows * n].reshape((rows, n)), right[: rows * n].reshape((rows, n))
+        edges = ends[runs[begin] : runs[begin + 1] + 1]
+        _among(inverse, columns[first : first + n], edges, first, q)
+        for o in range(begin, end):
+            _inverse_root(v[o], root)
+            i, at = 3 * (o - begin), 3 * starts[o]
+            for a in range(n):
+                y0, y1, y2 = wide[at + a], wide[at + n + a], wide[at + 2 * n + a]
+                z[i, a] = root[0, 0] * y0 + root[1, 0] * y1 + root[2, 0] * y2
+                z[i + 1, a] = root[1, 1] * y1 + root[2, 1] * y2
+                z[i + 2, a] = root[2, 2] * y2
+        np.dot(z, q, x)
+        for o in range(begin, end):
+            _inverse_root(v[o], root)
+            i = 3 * (o - begin)
+            _own_cofactors(root, z[i : i + 3], x[i : i + 3], cross[starts[o] :], out[o])
+
+
+def _own_cofactors(root, z, x, cross, out):
+    """What _cofactors writes of one block; z and x (3, n) are Z' and Z'Q."""
+    n = z.shape[1]
+    for c in range(3):
         for a in range(n):
-            at = 3 * first + a
-            y0, y1, y2 = wide[at], wide[at + n], wide[at + 2 * n]
-            z[0, a] = i00 * y0 + i10 * y1 + i20 * y2
-            z[1, a] = i11 * y1 + i21 * y2
-            z[2, a] = i22 * y2
-        s00, s10, s11, s20, s21, s22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for a in range(n):
-            x0, x1, x2 = 0.0, 0.0, 0.0
-            for one in range(runs[o], runs[o + 1]):
-                begin, end = ends[one], ends[one + 1]
-                line = inverse[c[a], columns[begin] : columns[begin] + end - begin]
-                z0 = z[0, begin - first : end - first]
-                z1 = z[1, begin - first : end - first]
-                z2 = z[2, begin - first : end - first]
-                for q in range(end - begin):
-                    x0 += line[q] * z0[q]
-                    x1 += line[q] * z1[q]
-                    x2 += line[q] * z2[q]
-            cross[first + a, 0], cross[first + a, 1], cross[first + a, 2] = -x0, -x1, -x2
-            s00 += z[0, a] * x0
-            s10 += z[1, a] * x0
-            s11 += z[1, a] * x1
-            s20 += z[2, a] * x0
-            s21 += z[2, a] * x1
-            s22 += z[2, a] * x2
-        out[o, 0, 0] = s00 + i00 * i00 + i10 * i10 + i20 * i20
-        out[o, 1, 0] = s10 + i10 * i11 + i20 * i21
-        out[o, 1, 1] = s11 + i11 * i11 + i21 * i21
-        out[o, 2, 0] = s20 + i20 * i22
-        out[o, 2, 1] = s21 + i21 * i22
-        out[o, 2, 2] = s22 + i22 * i22
-        out[o, 0, 1], out[o, 0, 2], out[o, 1, 2] = out[o, 1, 0], out[o, 2, 0], out[o, 2, 1]
+            cross[a, c] = -x[c, a]
+        for d in range(c + 1):
+            total = 0.0
+            for a in range(n):
+                total += z[c, a] * x[d, a]
+            for e in range(c, 3):
+                total += root[e, c] * root[e, d]
+            out[c, d] = out[d, c] = total
 
 
 def _leverage(jac, block, first, place, cuts, inverse, cross, cofactors, spare, out):

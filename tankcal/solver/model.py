@@ -3,7 +3,8 @@
 The unknowns are numbered so that the reduced ones come first and the eliminated blocks, three
 unknowns each, come last. No row touches two blocks. For each block the plan keeps the sorted list
 of reduced columns that occur together with it: its part of the normal matrix is stored for these
-columns only, in three rows, one an unknown of the block ("wide").
+columns only, in three rows, one an unknown of the block ("wide"). Neighbouring blocks whose columns
+are nearly the same are given those of each other, too, so that they are eliminated together.
 """
 
 from collections.abc import Callable
@@ -12,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tankcal.solver import loops
+from tankcal.solver import series
 from tankcal.solver.compiled import compile_functions, is_worth_compiling
 
 
@@ -187,7 +188,7 @@ class Plan:
     columns           (t,) reduced columns of all blocks, ascending in each
     ends              (s + 1,) where in `columns` runs of neighbouring columns begin, t at the end
     runs              (nb + 1,) where in `ends` each block begins
-    alike             where series of neighbouring blocks with the same columns begin; nb at the end
+    alike             where series of blocks with the same columns begin, see series; nb at the end
     """
 
     reduced: int
@@ -232,6 +233,9 @@ def _structure(reduced, blocks, raw):
         if block is not None:
             _mark(together, block, cuts, first)
     together[:, reduced] = False
+    changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
+    alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
+    alike = series._join_series(together, alike)
     met = np.flatnonzero(together)
     starts = np.searchsorted(met, np.arange(blocks + 1) * (reduced + 1))
     owner = np.repeat(np.arange(blocks, dtype=np.int32), np.diff(starts))
@@ -240,8 +244,6 @@ def _structure(reduced, blocks, raw):
     place.ravel()[met] = np.arange(len(met), dtype=np.int32)
     places = [None if one[3] is None else place[one[3][:, None], one[-1]] for one in raw]
     ends = np.flatnonzero(np.diff(met, prepend=-2, append=-2) != 1)
-    changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
-    alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
     return starts, columns, ends, alike, places
 
 
@@ -260,13 +262,15 @@ def _mark(together, block, cuts, first):
 
 def _structure_by_loops(reduced, blocks, raw):
     """The same by compiled loops."""
-    run = compile_functions(loops, loops.COMPILED)
+    run = compile_functions(series, series.COMPILED)
     together = np.zeros((blocks, reduced + 1), dtype=bool)
     for _, _, _, block, cuts, first in raw:
         if block is not None:
             run._mark(block, first, cuts, together)
+    together[:, reduced] = False
+    alike = run._join_series(together, run._list_series(together))
     starts = np.zeros(blocks + 1, dtype=int)
-    columns, ends, alike = run._list_columns(together, reduced, starts)
+    columns, ends = run._list_columns(together, reduced, alike, starts)
     places = []
     for _, _, _, block, _, first in raw:
         place = None if block is None else np.empty(first.shape, dtype=np.int32)
@@ -286,7 +290,7 @@ def _cuts(columns, spare):
         return np.arange(k + 1)
     follows = np.ones(k - 1, dtype=bool)
     if is_worth_compiling(n):
-        run = compile_functions(loops, loops.COMPILED)
+        run = compile_functions(series, series.COMPILED)
         run._follow(np.ascontiguousarray(columns), spare, follows)
     else:
         for start in range(0, n, AT_ONCE):

@@ -74,7 +74,7 @@ def null_space(work, state, faint=FAINT, nothing=NOTHING):
     lengths = np.sqrt(np.concatenate(diagonal))
     scale = 1.0 / np.where(lengths > 0, lengths, 1.0)
     eliminate(work.plan, normals, 0.0, 0.0)
-    s = np.triu(normals.t[:nr, :nr] + np.tril(normals.t[:nr, :nr], -1).T)
+    s = np.triu(normals.t[:nr, :nr])
     s += np.triu(s, 1).T
     s = s * scale[:nr] * scale[:nr, None]
     tangent = work.conditions.tangent(state, scale[:nr]) if work.conditions else None

@@ -23,7 +23,7 @@ class Refusing:
         raise OSError(30, "Read-only file system")
 
 numba.core.caching.tempfile = Refusing
-import tankcal.camera.imaging, tankcal.solver.loops
+import tankcal.camera.imaging, tankcal.solver.loops, tankcal.solver.series
 from networks import by_total_station, photographed
 from tankcal.solver.compiled import compile_functions
 from tankcal.survey.network import adjust
@@ -31,7 +31,11 @@ from tankcal.survey.network import adjust
 for make in (photographed, by_total_station):
     adjusted = adjust(make()[0], datum="inner")
     assert adjusted.residuals and adjusted.point_covariances_m2.any()
-rooms = {tankcal.solver.loops: "COMPILED", tankcal.camera.imaging: "_COMPILED"}
+rooms = {
+    tankcal.solver.loops: "COMPILED",
+    tankcal.solver.series: "COMPILED",
+    tankcal.camera.imaging: "_COMPILED",
+}
 loops = [vars(compile_functions(room, vars(room)[names])) for room, names in rooms.items()]
 stats = [one.stats for room in loops for one in room.values()]
 print(sum(len(one.cache_hits) for one in stats), sum(len(one.cache_misses) for one in stats))

@@ -8,7 +8,7 @@ import pytest
 from tankcal.camera import imaging
 from tankcal.camera.model import Form
 from tankcal.geometry.rotations import rotation_of_view
-from tankcal.solver import Group, elimination, loops, model
+from tankcal.solver import Group, elimination, loops, model, series
 from tankcal.solver.model import Normals
 
 PHOTOS, POINTS, RAYS = 3, 40, 210  # more of a photo than are computed side by side
@@ -39,7 +39,7 @@ def test_image_points_side_by_side_are_those_of_arrays(form, in_ideal):
     photo[-20:] = rng.integers(0, PHOTOS, 20)  # some in no order
     point, xy_mm = rng.integers(0, POINTS, RAYS), rng.uniform(-15, 15, (RAYS, 2))
     given = (
-        xyz_m, centres_m, rotation, interior, tuple(form.numbers),
+        xyz_m, centres_m, rotation, interior, form.numbers,
         form.convention == "distortion_of_ideal", point, photo, xy_mm,
         rng.uniform(100, 300, (RAYS, 2)), active,
     )  # fmt: skip
@@ -78,7 +78,7 @@ def test_plans_by_loops_are_those_of_arrays(monkeypatch):
     groups = groups_of(np.random.default_rng(3), reduced, blocks)
     of_arrays = model.plan(reduced, blocks, groups)
     monkeypatch.setattr(model, "is_worth_compiling", lambda rows=0: True)
-    plain = SimpleNamespace(**{name: vars(loops)[name] for name in loops.COMPILED})
+    plain = SimpleNamespace(**{name: vars(series)[name] for name in series.COMPILED})
     monkeypatch.setattr(model, "compile_functions", lambda module, names: plain)
     found = model.plan(reduced, blocks, groups)
     assert len(found.columns) > 3 * blocks
@@ -91,6 +91,29 @@ def test_plans_by_loops_are_those_of_arrays(monkeypatch):
         assert one.place is None or (one.place == other.place).all()
 
 
+def test_blocks_eliminated_together_give_what_they_give_one_by_one(monkeypatch):
+    """Second method: each block with its own columns only."""
+    rng, reduced, blocks = np.random.default_rng(11), 15, 12
+    groups = groups_of(rng, reduced, blocks)
+    rows = [rng.normal(size=(len(group.columns), 1, group.columns.shape[1])) for group in groups]
+    found = []
+    for join in (series._join_series, lambda together, alike: alike):
+        monkeypatch.setattr(series, "_join_series", join)
+        plan = model.plan(reduced, blocks, groups)
+        normals = Normals.zero(plan)
+        normals.v[:, [0, 2, 5]] = 1.0
+        for batch in plan.batches:
+            jac = batch.of(rows[batch.group])
+            elimination.add_rows(plan, batch, jac[:, :, 0] + 0.5, jac, normals)
+        assert elimination.eliminate(plan, normals, 1e-3, 1e-12) == -1
+        back = elimination.back_substitute(plan, normals, np.arange(15.0))
+        found.append((len(plan.alike), normals.t[:-1, :-1], normals.g[:-1], back))
+    (joined, *of_joined), (alone, *of_single) = found
+    assert joined < alone
+    for one, other in zip(of_joined, of_single, strict=True):
+        assert one == pytest.approx(other, abs=1e-11)
+
+
 @pytest.mark.parametrize("panel", [4, loops.PANEL])
 def test_elimination_by_loops_is_that_of_arrays(panel, monkeypatch):
     rng, reduced, blocks = np.random.default_rng(7), 15, 12
@@ -100,11 +123,14 @@ def test_elimination_by_loops_is_that_of_arrays(panel, monkeypatch):
     first.v[:] = (root @ root.transpose(0, 2, 1))[:, *np.tril_indices(3)]
     for part in (first.wide[:-1], first.b, first.t[:-1, :-1], first.g[:-1]):
         part[:] = rng.normal(size=part.shape)
+    first.t[:] = np.triu(first.t)
     for name in vars(first):
         getattr(second, name)[:] = getattr(first, name)
     assert elimination.eliminate(plan, first, 1e-3, 1e-12) == -1
     step = rng.normal(size=reduced)
     blocks_of_arrays = elimination.back_substitute(plan, first, step)
+    inverse = np.cov(rng.normal(size=(reduced, 2 * reduced)))
+    of_arrays = elimination.block_cofactors(plan, first, inverse)
     monkeypatch.setattr(loops, "PANEL", panel)
     monkeypatch.setattr(elimination, "is_worth_compiling", lambda rows=0: True)
     plain = SimpleNamespace(**{name: vars(loops)[name] for name in loops.COMPILED})
@@ -114,6 +140,10 @@ def test_elimination_by_loops_is_that_of_arrays(panel, monkeypatch):
         assert getattr(second, name) == pytest.approx(getattr(first, name), abs=1e-12), name
     found = elimination.back_substitute(plan, second, step)
     assert found == pytest.approx(blocks_of_arrays, abs=1e-12)
+    for one, other in zip(
+        elimination.block_cofactors(plan, second, inverse), of_arrays, strict=True
+    ):
+        assert one == pytest.approx(other, abs=1e-11)
 
 
 def test_the_wide_part_has_three_rows_a_block():

@@ -109,7 +109,7 @@ def rows_of_fit(values, rays, image_mm, pixel_mm, form):
     x, y = rays[:, 0] * cos + rays[:, 1] * sin, rays[:, 1] * cos - rays[:, 0] * sin
     of_ideal = form.convention == "distortion_of_ideal"
     u, v, along, up = image_point_derivatives(
-        (x, y, -np.ones_like(x)), np.eye(3).ravel(), tuple(q), tuple(form.numbers), of_ideal
+        (x, y, -np.ones_like(x)), np.eye(3).ravel(), tuple(q), form.numbers, of_ideal
     )
     u, v = u - q[1], v - q[2]
     rows = []

@@ -296,7 +296,7 @@ def _known_nuisances(survey):
     """Scales and offsets of instruments with an sd: weighted unknowns."""
     observed = []
     for of, one in survey.nuisances.items():
-        index = np.flatnonzero(np.nan_to_num(one.sd) > 0)
+        index = np.flatnonzero(one.sd > 0)
         if len(index):
             observed.append(KnownUnknowns(one.value[index], one.sd[index], of, index))
     return observed

@@ -1,6 +1,7 @@
 """A survey as it goes into the adjustment: names, start values and observations, all in arrays."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -171,7 +172,7 @@ class Survey:
     set_names: tuple = ()
     kept: frozenset = frozenset()
 
-    @property
+    @cached_property
     def nuisances(self):
         """{name of `observations.NUISANCES`: Shared}: unknowns that observations share."""
         tools, sets = self.instruments, len(self.sets)

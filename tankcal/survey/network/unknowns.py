@@ -60,8 +60,8 @@ def layout_of(survey, eliminated, used, interior_free, table):
     of_points = columns(free_points & ~eliminated[:, None])
     reduced = next_column
     last = np.flatnonzero(eliminated)
-    if survey.image_points is not None:  # points in the same photos next to one another
-        mark = np.random.default_rng(0).random(len(free_photos))
+    if survey.image_points is not None:  # points in the same photos, or nearly, next to one another
+        mark = np.geomspace(1.0, 1e-12, len(free_photos))
         seen = np.bincount(
             survey.image_points.point, weights=mark[survey.image_points.photo], minlength=points
         )

@@ -87,7 +87,7 @@ class ImageCoordinates(Observations):
         of_ideal = self.form.convention == "distortion_of_ideal"
         image_rows(
             state.xyz_m, state.photo_xyz_m, state.rotation, state.interior[self.interior_of],
-            tuple(self.form.numbers), of_ideal, self.point, self.photo, value, weight,
+            self.form.numbers, of_ideal, self.point, self.photo, value, weight,
             self.active, w, jac, in_ideal=self.form.weights == "ideal",
         )  # fmt: skip
 
