@@ -1,8 +1,8 @@
 """The workbook as a file: its properties, its sheets and their page set-up and protection."""
 
 from datetime import datetime
-from functools import cached_property
-from itertools import pairwise
+from functools import cache, cached_property
+from itertools import pairwise, repeat
 
 import xlsxwriter
 from xlsxwriter.exceptions import FileCreateError
@@ -19,7 +19,7 @@ from tankcal.report.workbook.look import (
     lines_of,
     number_format,
 )
-from tankcal.report.workbook.sheet import Sheet
+from tankcal.report.workbook.sheet import NumberRow, Sheet
 from tankcal.report.workbook.writer import Writer
 
 RECORD_PROPERTY = "record.json SHA-256"  # `tankcal verify` looks for it
@@ -145,11 +145,15 @@ class Book(Writer):
         self.freeze(sheet, 0)
         for place, column in enumerate(columns):
             sheet.write_string(0, place, column.heading, self._head(column))
-            digits, count = column.digits, len(column.cells)
-            each = digits if isinstance(digits, list) else [digits] * count
-            looks = {one: self.format(num_format=number_format(one)) for one in set(each)}
-            sheet.write_numbers(1, place, column.cells, [looks[one] for one in each])
+        each = (one.digits if type(one.digits) is list else repeat(one.digits) for one in columns)
+        looks = cache(lambda *digits: tuple(map(self._number_look, digits)))
+        cells = zip(*(column.cells for column in columns), strict=True)
+        rows = (NumberRow(values, looks(*digits)) for values, *digits in zip(cells, *each))
+        sheet.write_number_rows(1, rows)
         return sheet
+
+    def _number_look(self, digits):
+        return self.format(num_format=number_format(digits))
 
     def _page(self, code, landscape, tab):
         """A new protected sheet with page set-up, header and footer."""
