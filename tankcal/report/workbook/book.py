@@ -3,6 +3,7 @@
 from datetime import datetime
 from functools import cache, cached_property
 from itertools import pairwise, repeat
+from pathlib import Path
 
 import xlsxwriter
 from xlsxwriter.exceptions import FileCreateError
@@ -69,7 +70,7 @@ class Book(Writer):
             "strings_to_formulas": False,
             "strings_to_urls": False,
             "strings_to_numbers": False,
-            "in_memory": True,
+            "tmpdir": str(Path(path).parent),  # where sheets wait: in memory they are held thrice
             "default_format_properties": dict(FONT),
         }
         super().__init__(xlsxwriter.Workbook(str(path), options), words)
@@ -145,11 +146,14 @@ class Book(Writer):
         self.freeze(sheet, 0)
         for place, column in enumerate(columns):
             sheet.write_string(0, place, column.heading, self._head(column))
-        each = (one.digits if type(one.digits) is list else repeat(one.digits) for one in columns)
-        looks = cache(lambda *digits: tuple(map(self._number_look, digits)))
-        cells = zip(*(column.cells for column in columns), strict=True)
-        rows = (NumberRow(values, looks(*digits)) for values, *digits in zip(cells, *each))
-        sheet.write_number_rows(1, rows)
+        digits = (
+            one.digits if isinstance(one.digits, list) else repeat(one.digits, len(one.cells))
+            for one in columns
+        )
+        looks = cache(lambda shown: tuple(map(self._number_look, shown)))
+        cells = zip(*(one.cells for one in columns), strict=True)
+        rows = zip(cells, map(looks, zip(*digits, strict=True)), strict=True)
+        sheet.write_number_rows(1, (NumberRow(*row) for row in rows))
         return sheet
 
     def _number_look(self, digits):

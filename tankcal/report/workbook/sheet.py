@@ -114,10 +114,9 @@ class Sheet(Worksheet):
         for look in dict.fromkeys(numbers.looks):
             if look not in indices:
                 indices[look] = look._get_xf_index()
-        self.fh.write(
-            "".join([
-                f'<c r="{name}{row + 1}" s="{indices[look]}"><v>{value:.16G}</v></c>'
-                for name, value, look in zip(names, *numbers, strict=False)
-                if value is not None
-            ])
-        )
+        cells = [
+            f'<c r="{name}{row + 1}" s="{indices[look]}"><v>{value:.16G}</v></c>'
+            for name, value, look in zip(names, *numbers, strict=False)
+            if value is not None
+        ]
+        self.fh.write("".join(cells))
