@@ -1,5 +1,6 @@
 """What the terminal shows, in the language of the job: progress, warnings, lists of files."""
 
+import gc
 import os
 import shutil
 import sys
@@ -13,6 +14,7 @@ from tankcal.text.languages import DEFAULT, nearest_language
 from tankcal.text.time_left import how_far
 
 RECORD = "record.json"
+OBJECTS_AT_ONCE = 10_000  # are made before the garbage collector looks: those of modules stay
 _LOCALE = ("LC_ALL", "LC_MESSAGES", "LANG")  # the first that is set counts
 TO_THE_END = "\x1b[K"  # a terminal clears the rest of the line
 _spoken = {}  # the words of the language that is spoken; nothing: English as it was made
@@ -96,8 +98,9 @@ def read_job(source, show, **options):
 
 
 def prepare_for_small_work():
-    """A second BLAS thread costs time with small matrices."""
+    """A second BLAS thread costs time with small matrices, and looking for garbage often, too."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    gc.set_threshold(OBJECTS_AT_ONCE)
 
 
 def warn(warnings):

@@ -17,6 +17,7 @@ STYLE = {
     "font.family": ["STIXGeneral", "DejaVu Serif"],
     "font.size": 8.5,
     "axes.linewidth": 0.5,
+    "axes.titley": 1.0,
     "axes.edgecolor": "#445566",
     "axes.unicode_minus": True,
     "xtick.major.width": 0.5,

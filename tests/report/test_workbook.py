@@ -12,7 +12,7 @@ from xlsxwriter.worksheet import Worksheet
 
 from tankcal.report.workbook import write
 from tankcal.report.workbook.look import Column, _longest_number
-from tankcal.report.workbook.sheet import Sheet
+from tankcal.report.workbook.sheet import NumberRow, Sheet
 from tankcal.text.digits import decimals_of
 from tankcal.text.words import choice_sentence, load_words, sentence
 
@@ -315,6 +315,11 @@ class CellByCell(Worksheet):
             if value is not None:
                 self.write_number(row, column, value, look)
 
+    def write_number_rows(self, first_row, rows):
+        for row, (values, looks) in enumerate(rows, first_row):
+            for column, look in enumerate(looks):
+                self.write_numbers(row, column, values[column : column + 1], [look])
+
 
 @pytest.mark.slow
 def test_columns_of_numbers_are_the_cells_of_xlsxwriter(short, tmp_path, monkeypatch):
@@ -331,6 +336,8 @@ def test_columns_of_numbers_are_the_cells_of_xlsxwriter(short, tmp_path, monkeyp
 def test_a_number_that_no_cell_holds_is_refused(first_row, value, error):
     with pytest.raises(error):
         Sheet().write_numbers(first_row, 0, [None, value], [None, None])
+    with pytest.raises(error):
+        Sheet().write_number_rows(first_row, [NumberRow([None, value], (None, None))] * 2)
 
 
 @pytest.mark.parametrize(

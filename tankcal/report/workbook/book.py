@@ -1,8 +1,9 @@
 """The workbook as a file: its properties, its sheets and their page set-up and protection."""
 
 from datetime import datetime
-from functools import cached_property
-from itertools import pairwise
+from functools import cache, cached_property
+from itertools import pairwise, repeat
+from pathlib import Path
 
 import xlsxwriter
 from xlsxwriter.exceptions import FileCreateError
@@ -19,7 +20,7 @@ from tankcal.report.workbook.look import (
     lines_of,
     number_format,
 )
-from tankcal.report.workbook.sheet import Sheet
+from tankcal.report.workbook.sheet import NumberRow, Sheet
 from tankcal.report.workbook.writer import Writer
 
 RECORD_PROPERTY = "record.json SHA-256"  # `tankcal verify` looks for it
@@ -69,7 +70,7 @@ class Book(Writer):
             "strings_to_formulas": False,
             "strings_to_urls": False,
             "strings_to_numbers": False,
-            "in_memory": True,
+            "tmpdir": str(Path(path).parent),  # where sheets wait: in memory they are held thrice
             "default_format_properties": dict(FONT),
         }
         super().__init__(xlsxwriter.Workbook(str(path), options), words)
@@ -145,11 +146,18 @@ class Book(Writer):
         self.freeze(sheet, 0)
         for place, column in enumerate(columns):
             sheet.write_string(0, place, column.heading, self._head(column))
-            digits, count = column.digits, len(column.cells)
-            each = digits if isinstance(digits, list) else [digits] * count
-            looks = {one: self.format(num_format=number_format(one)) for one in set(each)}
-            sheet.write_numbers(1, place, column.cells, [looks[one] for one in each])
+        digits = (
+            one.digits if isinstance(one.digits, list) else repeat(one.digits, len(one.cells))
+            for one in columns
+        )
+        looks = cache(lambda shown: tuple(map(self._number_look, shown)))
+        cells = zip(*(one.cells for one in columns), strict=True)
+        rows = zip(cells, map(looks, zip(*digits, strict=True)), strict=True)
+        sheet.write_number_rows(1, (NumberRow(*row) for row in rows))
         return sheet
+
+    def _number_look(self, digits):
+        return self.format(num_format=number_format(digits))
 
     def _page(self, code, landscape, tab):
         """A new protected sheet with page set-up, header and footer."""

@@ -32,7 +32,7 @@ def factor_sheet(book, record):
     columns = [Column(_dip(book), heights, height_digits(heights), 12)]
     by_column = zip(*capacity["factor_m3"], strict=True)
     columns += [
-        Column(name, list(cells), _DIGITS, _WIDTH)
+        Column(name, cells, _DIGITS, _WIDTH)
         for name, cells in zip(column_names(book, capacity), by_column, strict=True)
     ]
     sheet = book.plain_sheet("covariance_factor", columns, landscape=True)
