@@ -3,10 +3,15 @@
 Simulation: the tanks and crews of `crews`, whose readings are spoilt as a crew does by hand.
 """
 
+import numpy as np
 import pytest
+from job_builder import write_folder
 from test_slips_of_crews import book_of, computed
 
+import tankcal
 from tankcal.errors import InputError
+from tankcal.job.checks.survey.packed_dms import chance_of_packed
+from tankcal.pipeline.misread_hits import refuse_other_units
 
 IN_METRES = [
     ("strapping", "circumferences", "s_mm"),
@@ -47,3 +52,50 @@ def test_many_offsets_set_aside_are_one_question(tmp_path):
     _, told = computed(tmp_path, book)
     assert "many_offsets_set_aside" in told
     assert "offset_set_aside" not in told
+
+
+def packed(degrees):
+    """12.5125 for 12.5125 degrees, which are 12 30 45: 12.3045."""
+    seconds = round(degrees * 3600)
+    return seconds // 3600 + seconds // 60 % 60 / 100 + seconds % 60 / 10000
+
+
+@pytest.mark.parametrize(("kind", "table"), [("hits", "wall_hits"), ("tangents", "tangents")])
+def test_packed_degrees_minutes_and_seconds_are_refused(tmp_path, kind, table):
+    book = book_of(kind, 1002)
+    for row in book.tables[table]:
+        row["direction_deg"] = packed(row["direction_deg"] % 360)
+    assert problems_of(tmp_path, book) == [("packed_dms", 2, "direction_deg")]
+
+
+def test_decimal_degrees_are_rarely_as_packed_ones():
+    """Closed form: of n independent readings 0.6^n have no second pair of decimals over 59, and
+    fewer none of both pairs.
+    """
+    rng = np.random.default_rng(5)
+    decimal = np.round(rng.uniform(0, 360, (2000, 6)), 4)
+    found = np.array([chance_of_packed(each) for each in decimal])
+    share = np.mean(found < 1)
+    assert abs(share - 0.36**6) < 4 * np.sqrt(0.36**6 / 2000)
+    assert found.min() >= 0.6**6 - 1e-12
+    assert chance_of_packed(np.arange(0, 360, 22.5)) == 1.0
+    assert chance_of_packed(np.arange(0.5, 40)) == 1.0  # says nothing
+
+
+@pytest.mark.parametrize("half", [(0, 180), (90, 270), (180, 360)])
+def test_hits_over_half_a_circle_are_in_the_unit_that_they_are_in(tmp_path, half):
+    book = book_of("hits", 1002)
+    rows = book.tables["wall_hits"]
+    book.tables["wall_hits"] = [one for one in rows if half[0] <= one["direction_deg"] < half[1]]
+    assert 0.4 < len(book.tables["wall_hits"]) / len(rows) < 0.6
+    refuse_other_units(tankcal.load(write_folder(tmp_path, book.parts())).hits)
+
+
+def test_degrees_in_a_column_of_gon_are_refused_by_name(tmp_path):
+    book = book_of("hits", 1002)
+    for row in book.tables["wall_hits"]:
+        row["direction_gon"] = row.pop("direction_deg")
+    hits = tankcal.load(write_folder(tmp_path, book.parts())).hits
+    with pytest.raises(InputError) as told:
+        refuse_other_units(hits)
+    assert [one.expected.code for one in told.value.problems] == ["hits_in_degrees"]

@@ -8,6 +8,7 @@ from tankcal.errors import SHEET
 from tankcal.job.checking import has_rows
 from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.checks.survey.instruments import TAKEN_FROM_SETUPS
+from tankcal.job.checks.survey.packed_dms import refuse_packed
 from tankcal.job.contract.observations import ANGLE_UNITS, ANGLES, READINGS
 from tankcal.messages import join_with_or, list_some, message
 
@@ -156,6 +157,8 @@ def check_angle(files, table, angle, *, is_needed=True):
         "angle_in_two_units", "in two units; expected one of {wanted}", wanted=wanted
     )
     tell_rows(files.log.problem, table, twice, first, expected)
+    if f"{angle}_deg" in headings:
+        refuse_packed(table, f"{angle}_deg", files.log)
 
 
 def files_name(table):
