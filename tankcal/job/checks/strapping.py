@@ -65,7 +65,7 @@ def check_readings(straps, tables, registers, raw, log):
     if has_rows(tables["obstructions"]):
         names = set(straps.of("circumference"))
         refuse_others(tables["obstructions"], "circumference", names, log)
-        check_obstructions(tables["obstructions"], log)
+        check_obstructions(tables["obstructions"], straps, log)
         check_spans(tables["obstructions"], straps, tapes_read(straps, tapes), tapes, raw, log)
     _check_comparisons(tables["tape_checks"], tapes, raw, log)
 
