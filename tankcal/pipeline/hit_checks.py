@@ -15,6 +15,7 @@ from tankcal.pipeline.level_checks import (
     girth_m,
     levels_with_few,
 )
+from tankcal.pipeline.lost_setups import check_lost_setups
 from tankcal.pipeline.moved_setups import (
     critical_of_ranging,
     moved_or_ranged,
@@ -49,6 +50,7 @@ def check_hits(job, wall, sighting):
         *_of_levels(job, wall),
         *_of_courses(job, sighting),
         *_of_incidence(sighting),
+        *check_lost_setups(job, wall, sighting),
         *_of_setups(job, wall, sighting),
         *check_nominal(job, wall, job.hits.file),
         *(() if wall.by_inputs else check_size_told(job, [*job.hits.instruments])),

@@ -99,3 +99,14 @@ def test_degrees_in_a_column_of_gon_are_refused_by_name(tmp_path):
     with pytest.raises(InputError) as told:
         refuse_other_units(hits)
     assert [one.expected.code for one in told.value.problems] == ["hits_in_degrees"]
+
+
+@pytest.mark.parametrize(("kind", "table"), [("hits", "wall_hits"), ("tangents", "tangents")])
+def test_a_file_that_was_pasted_twice_is_told(tmp_path, kind, table):
+    book = book_of(kind, 1002)
+    for times in (1, 2):
+        parts = book.parts()
+        parts.tables[table] = [*parts.tables[table][:1], *times * parts.tables[table][1:]]
+        job = tankcal.load(write_folder(tmp_path, parts))
+        told = {one.expected.code for one in job.warnings}
+        assert ("pasted_rows" in told) == (times == 2)

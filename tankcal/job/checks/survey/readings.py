@@ -127,11 +127,11 @@ def check_readings(files):
         if name in ANGLES:
             check_angle(files, table, ANGLES[name])
         _refuse_same_ends(files, name, table)
-        _warn_copies(files, table)
+        warn_copies(files, table)
     if has_rows(files.tables["directions"]):
         _warn_single_directions(files, files.tables["directions"])
     if has_rows(files.tables["image_points"]):
-        _warn_copies(files, files.tables["image_points"])
+        warn_copies(files, files.tables["image_points"])
 
 
 def check_angle(files, table, angle, *, is_needed=True):
@@ -200,8 +200,11 @@ def _refuse_same_ends(files, name, table):
         files.log.problem(table.file, expected, row, "to")
 
 
-def _warn_copies(files, table):
-    """Rows that are the same to the last digit, more than chance brings; one warning for a file."""
+def warn_copies(files, table, *, are_sights=False):
+    """Rows that are the same to the last digit, more than chance brings; one warning for a file.
+
+    are_sights  of the wall, of which chance brings none that are alike
+    """
     raw = files.raw.tables[files_name(table)]
     first, copies = {}, []
     for row, cells in zip(raw.row_numbers, raw.rows, strict=True):
@@ -213,12 +216,24 @@ def _warn_copies(files, table):
             copies.append((row, before))
     if len(copies) <= BY_CHANCE * len(raw.rows):
         return
-    expected = message(
-        "copied_rows",
-        "{count} rows are the same as another one to the last digit (rows {pairs}): were "
-        "they copied? Each counts as a separate reading",
-        count=len(copies),
-        pairs=list_some([f"{row} = {before}" for row, before in copies], MOST_REPEATED),
+    told = {
+        "count": len(copies),
+        "pairs": list_some([f"{row} = {before}" for row, before in copies], MOST_REPEATED),
+    }
+    expected = (
+        message(
+            "pasted_rows",
+            "{count} rows are the same as another one to the last digit (rows {pairs}): was a part"
+            " of the file pasted twice?",
+            **told,
+        )
+        if are_sights
+        else message(
+            "copied_rows",
+            "{count} rows are the same as another one to the last digit (rows {pairs}): were "
+            "they copied? Each counts as a separate reading",
+            **told,
+        )
     )
     files.log.warning(table.file, expected, copies[0][0])
 
