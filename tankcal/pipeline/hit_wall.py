@@ -10,6 +10,7 @@ from tankcal.job.checks.hits import offset_unknown
 from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import told_causes
 from tankcal.pipeline.misread_hits import refuse_other_units
+from tankcal.pipeline.misread_lines import refuse_misread_heights, refuse_misread_lines
 from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.wall import find_wall, joints_of
 from tankcal.sections import coordinates_of
@@ -52,13 +53,16 @@ def sight_wall(job, adjustment, progress):
         )
     )
     refuse_other_units(job.hits)
+    refuse_misread_lines(job.hits)
     poses = poses_of(
         job.hits,
         adjustment,
         nominal_m=job.tank.nominal_diameter_m / 2,
         is_inside=job.survey.side == "inside",
     )
-    sighting = replace(sight(job.hits, poses), beside=_targets_beside(job, poses, adjustment))
+    sighting = sight(job.hits, poses)
+    refuse_misread_heights(job, sighting)
+    sighting = replace(sighting, beside=_targets_beside(job, poses, adjustment))
     _refuse_side(job, sighting)
     _refuse_unknown_offset(job, sighting)
     return _as_points(job, sighting)

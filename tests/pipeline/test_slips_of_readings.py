@@ -3,6 +3,8 @@
 Simulation: the tanks and crews of `crews`, whose readings are spoilt as a crew does by hand.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from job_builder import write_folder
@@ -12,6 +14,7 @@ import tankcal
 from tankcal.errors import InputError
 from tankcal.job.checks.survey.packed_dms import chance_of_packed
 from tankcal.pipeline.misread_hits import refuse_other_units
+from tankcal.pipeline.misread_lines import refuse_misread_lines
 
 IN_METRES = [
     ("strapping", "circumferences", "s_mm"),
@@ -110,3 +113,44 @@ def test_a_file_that_was_pasted_twice_is_told(tmp_path, kind, table):
         job = tankcal.load(write_folder(tmp_path, parts))
         told = {one.expected.code for one in job.warnings}
         assert ("pasted_rows" in told) == (times == 2)
+
+
+def line_of_hits(spoil):
+    """Twelve hits up a wall that leans by 3 mm a metre and bulges by 5 mm, 14 m away."""
+    height = np.linspace(-1, 11, 12)
+    away = 14 + 3e-3 * height + 5e-3 * np.sin(3 * height)
+    zenith, distance = spoil(np.arctan2(away, height), np.hypot(away, height))
+    direction = np.full(12, 2.0)
+    each = {"zenith_rad": zenith, "distance_m": distance, "direction_rad": direction}
+    return SimpleNamespace(
+        setup=("G1",) * 12, rows=tuple(range(2, 14)), file="wall_hits.csv", **each
+    )
+
+
+LINES = {
+    "lines_of_hits_in_gon": lambda zenith, distance: (zenith / 0.9, distance),
+    "lines_of_hits_in_degrees": lambda zenith, distance: (zenith * 0.9, distance),
+    "lines_of_hits_horizontal": lambda zenith, distance: (zenith, distance * np.sin(zenith)),
+}
+
+
+@pytest.mark.parametrize("code", LINES)
+def test_a_line_of_hits_in_another_unit_is_refused(code):
+    """Closed form: hits of an upright line, read so."""
+    with pytest.raises(InputError) as told:
+        refuse_misread_lines(line_of_hits(LINES[code]))
+    assert [(one.expected.code, one.row) for one in told.value.problems] == [(code, 2)]
+
+
+def test_a_sound_line_of_hits_is_taken():
+    refuse_misread_lines(line_of_hits(lambda zenith, distance: (zenith, distance)))
+
+
+@pytest.mark.parametrize("kind", ["hits", "three set-ups"])
+def test_hits_in_feet_are_refused_by_the_heights_of_their_courses(tmp_path, kind):
+    book = book_of(kind, 1002)
+    rows = [row for row in book.tables["wall_hits"] if row["setup"] == "E1"]
+    for row in rows:
+        row["distance_m"] /= 0.3048
+    found = problems_of(tmp_path, book)
+    assert [one[0] for one in found] == ["hits_of_other_length"]
