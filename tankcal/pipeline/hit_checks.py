@@ -143,7 +143,7 @@ def _of_courses(job, sighting):
         text = (
             message(
                 "hits_beyond_ends",
-                "{count} hits are said to be of course {course!r}, but lie beyond the end of the"
+                "hits that are said to be of course {course!r} ({count}) lie beyond the end of the"
                 " shell: is bottom_z_m right, and the height of the instrument?",
                 count=len(places),
                 course=name,
@@ -151,8 +151,8 @@ def _of_courses(job, sighting):
             if not there
             else message(
                 "hits_of_other_course",
-                "{count} hits are said to be of course {course!r}, but lie at the height of course"
-                " {there!r}: is the name wrong, or bottom_z_m, or the height of the instrument?",
+                "hits that are said to be of course {course!r} ({count}) lie at the height of"
+                " course {there!r}: is the name wrong, or bottom_z_m, or the height of the instrument?",
                 count=len(places),
                 course=name,
                 there=there,
@@ -207,11 +207,11 @@ def _of_setups(job, wall, sighting):
         text = message(
             "hits_ranged_otherwise",
             "the distances from set-up {setup!r} contradict all others (w = {w:.1f}), as if they"
-            " were {longer_mm:+.1f} mm too long: was the constant of a reflector set, or another"
-            " instrument or mode used?",
+            " were {too_long}: was the constant of a reflector set, or another instrument or mode"
+            " used?",
             setup=setup,
             w=w,
-            longer_mm=1000 * longer,
+            too_long=_too_long(1000 * longer),
         )
         yield Problem("setups.csv", text, job.hits.setups[setup].row, "instrument")
         return
@@ -230,6 +230,12 @@ def _of_setups(job, wall, sighting):
             **worst,
         )
         yield Problem("setups.csv", text, job.hits.setups[worst["setup"]].row, "setup")
+
+
+def _too_long(by_mm):
+    if by_mm < 0:
+        return message("mm_too_short", "{by_mm:.1f} mm too short", by_mm=-by_mm)
+    return message("mm_too_long", "{by_mm:.1f} mm too long", by_mm=by_mm)
 
 
 def causes_unlike_certificates(wall, told, file="instruments.toml", *, taken_off_m):

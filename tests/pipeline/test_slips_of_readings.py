@@ -154,3 +154,33 @@ def test_hits_in_feet_are_refused_by_the_heights_of_their_courses(tmp_path, kind
         row["distance_m"] /= 0.3048
     found = problems_of(tmp_path, book)
     assert [one[0] for one in found] == ["hits_of_other_length"]
+
+
+def test_a_correction_in_parts_in_a_million_is_mended_to_what_it_is(tmp_path):
+    book = book_of("strapping", 1002)
+    book.instruments["T-88"]["correction"] = "35 ppm"
+    with pytest.raises(InputError) as told:
+        computed(tmp_path, book)
+    assert "write 3.5e-05 without" in str(told.value)
+
+
+def test_a_negative_length_is_asked_for_its_sign(tmp_path):
+    book = book_of("strapping", 1002)
+    book.tables["circumferences"][1]["reading_m"] *= -1
+    with pytest.raises(InputError) as told:
+        computed(tmp_path, book)
+    assert "is the sign wrong?" in str(told.value)
+    assert len(told.value.problems) == 1
+
+
+def test_a_row_that_is_short_gives_one_line(tmp_path):
+    """The obstructions of its circumference are not told, too."""
+    folder = write_folder(tmp_path, book_of("strapping", 1002).parts())
+    file = folder / "circumferences.csv"
+    rows = file.read_text().splitlines()
+    name = rows[1].split(",")[0]
+    cut = [row.rpartition(",")[0] if row.split(",")[0] == name else row for row in rows]
+    file.write_text("\n".join(cut))
+    with pytest.raises(InputError) as told:
+        tankcal.load(folder)
+    assert {one.file for one in told.value.problems} == {"circumferences.csv"}
