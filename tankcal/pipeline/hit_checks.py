@@ -152,7 +152,8 @@ def _of_courses(job, sighting):
             else message(
                 "hits_of_other_course",
                 "hits that are said to be of course {course!r} ({count}) lie at the height of"
-                " course {there!r}: is the name wrong, or bottom_z_m, or the height of the instrument?",
+                " course {there!r}: is the name wrong, or bottom_z_m, or the height of the"
+                " instrument?",
                 count=len(places),
                 course=name,
                 there=there,
