@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from job_builder import write_folder
+from job_builder import job_parts, write_folder
 from test_slips_of_crews import book_of, computed
 
 import tankcal
@@ -184,3 +184,22 @@ def test_a_row_that_is_short_gives_one_line(tmp_path):
     with pytest.raises(InputError) as told:
         tankcal.load(folder)
     assert {one.file for one in told.value.problems} == {"circumferences.csv"}
+
+
+@pytest.mark.parametrize(
+    ("sd_mm", "is_refused"),
+    [(1e-7, True), (0.0005, False)],  # that of 0.5 mm in metres is asked
+)
+def test_standard_deviations_of_nothing_are_refused(tmp_path, sd_mm, is_refused):
+    """Of a network the adjustment would end without naming a file, and so of points."""
+    book = book_of("tangents", 1002)
+    for row in book.tables["slope_distances"]:
+        row["s_mm"] = sd_mm
+    for place, parts in enumerate((book.parts(), job_parts(sd_mm=sd_mm))):
+        folder = write_folder(tmp_path / str(place), parts)
+        if is_refused:
+            with pytest.raises(InputError) as told:
+                tankcal.load(folder)
+            assert {one.expected.code for one in told.value.problems} == {"tiny_sd_mm"}
+        else:
+            assert "tiny_sd_mm" in {one.expected.code for one in tankcal.load(folder).warnings}
