@@ -17,9 +17,6 @@ PULL = 2.0  # a pull so many times that of the certificate, or one part in so ma
 UNITS_N = {"kgf": 9.80665, "lbf": 4.4482216}
 THICKNESS_M = (5e-5, 1.2e-3)  # of tapes
 STIFFNESS_N = (1e5, 5e6)  # of tapes: 0.5 to 25 mm2 of steel
-CLASS_II_M, CLASS_II = 3e-4, 2e-4  # what a tape of class II of OIML R 35-1 is off by: a + b L
-APART = 1e-3  # chance of comparisons with a master that differ as much
-SHELL_UNLIKE_K = 5.0  # of tapes that were read from the table's temperature
 BY_CHANCE = 0.02  # as many equal repeats, or more, so rarely come by chance
 
 
@@ -71,7 +68,7 @@ def _of_no_shell_temperature(job, straps):
     if is_given or not read:
         return
     tape = float(np.median(read))
-    if abs(tape - base) > SHELL_UNLIKE_K:
+    if abs(tape - base) > limits_of("strapping")["shell_unlike_tape_k"]:
         text = message(
             "shell_temperature_of_tapes",
             "blank, so the shell is taken to be at the table's {base:g} degrees Celsius, but the"
@@ -167,7 +164,9 @@ def _of_whole_correction(tape, straps):
     """Both corrections of a tape together against the length that was read with it."""
     read = [one.strap.reading_m for one in straps.reduced if one.strap.tape == tape.name]
     length = float(np.median(read))
-    whole, most = tape.correction_m + tape.correction * length, CLASS_II_M + CLASS_II * length
+    limit = limits_of("strapping")["class_ii"]
+    most = (limit["mm"] + limit["mm_per_m"] * length) / 1000
+    whole = tape.correction_m + tape.correction * length
     if tape.correction_m and abs(whole) > most:
         text = message(
             "tape_correction_mm_strange",
@@ -192,7 +191,7 @@ def _of_comparisons(job, straps):
     weight = (length / np.array([one.sd_m for one in many])) ** 2
     scale = np.sum(weight * apart / length) / np.sum(weight)
     square = float(np.sum(weight * (apart / length - scale) ** 2))
-    if chdtrc(len(many) - 1, square) < APART:
+    if chdtrc(len(many) - 1, square) < limits_of("strapping")["comparisons_by_chance"]:
         away = 1000 * (apart - scale * length)
         worst, least = many[int(np.argmax(away))], many[int(np.argmin(away))]
         text = message(
