@@ -183,7 +183,8 @@ def _of_whole_correction(tape, straps):
 def _of_comparisons(job, straps):
     """Comparisons with a master that differ by more than their standard deviations allow."""
     used = [tape for tape, _ in straps.tapes if tape.master]
-    many = [one for one in job.strapping.comparisons if one.sd_m > 0]
+    strapping = job.strapping if job.great_circles is None else job.great_circles.strapping
+    many = [one for one in strapping.comparisons if one.sd_m > 0]
     if not used or len(many) < 2:
         return
     apart = np.array([one.master_m - one.working_m for one in many])
