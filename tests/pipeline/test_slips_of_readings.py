@@ -203,3 +203,16 @@ def test_standard_deviations_of_nothing_are_refused(tmp_path, sd_mm, is_refused)
             assert {one.expected.code for one in told.value.problems} == {"tiny_sd_mm"}
         else:
             assert "tiny_sd_mm" in {one.expected.code for one in tankcal.load(folder).warnings}
+
+
+@pytest.mark.slow
+def test_a_section_of_tangents_is_named_by_its_level(tmp_path):
+    book = book_of("tangents", 1002)
+    table = book.tables["tangents"]
+    level = table[0]["level_m"]
+    seen = sorted({row["setup"] for row in table})[:4]
+    book.tables["tangents"] = [
+        row for row in table if row["level_m"] != level or row["setup"] in seen
+    ]
+    _, told = computed(tmp_path, book)
+    assert f"section at {level:.3f} m (course 1)" in told["section_gap"]

@@ -6,7 +6,7 @@ from tankcal.job.checking import has_rows
 from tankcal.messages import message
 
 LEAST = {"s_mm": 0.02, "s_arcsec": 0.02}  # smaller than any scale or circle is read
-READ = ("circumferences", "great_circles", "offsets", "wall_hits", "tangents")
+READ = ("circumferences", "great_circles", "offsets", "wall_hits", "tangents", "tape_checks")
 
 
 def refuse_tiny_sds(tables, registers, raw, log):
