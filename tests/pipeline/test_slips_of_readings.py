@@ -13,6 +13,7 @@ from test_slips_of_crews import book_of, computed
 import tankcal
 from tankcal.errors import InputError
 from tankcal.job.checks.survey.packed_dms import chance_of_packed
+from tankcal.pipeline.hit_wall import _refuse_stations_outside
 from tankcal.pipeline.misread_hits import refuse_other_units
 from tankcal.pipeline.misread_lines import refuse_misread_lines
 
@@ -216,3 +217,26 @@ def test_a_section_of_tangents_is_named_by_its_level(tmp_path):
     ]
     _, told = computed(tmp_path, book)
     assert f"section at {level:.3f} m (course 1)" in told["section_gap"]
+
+
+def stations_round(radius_m, side):
+    """A job of 12 m radius with eight stations round it, by what is asked of it."""
+    angle = np.arange(8) * np.pi / 4
+    places = radius_m * np.column_stack([np.sin(angle), np.cos(angle), 0 * angle])
+    names = [f"Q{i}" for i in range(8)]
+    setups = {name: SimpleNamespace(station=name) for name in names}
+    stations = dict(zip(names, places + [100, 50, 0], strict=True))
+    return SimpleNamespace(
+        hits=SimpleNamespace(setup=names, setups=setups, stations=stations),
+        survey=SimpleNamespace(side=side),
+        tank=SimpleNamespace(nominal_diameter_m=24.0),
+    )
+
+
+def test_stations_outside_are_told_where_the_side_is_inside():
+    """Closed form: a circle of stations, wider or narrower than the tank."""
+    _refuse_stations_outside(stations_round(26.0, "outside"))
+    _refuse_stations_outside(stations_round(11.0, "inside"))
+    with pytest.raises(InputError) as told:
+        _refuse_stations_outside(stations_round(26.0, "inside"))
+    assert told.value.problems[0].expected.code == "hits_on_other_side"
