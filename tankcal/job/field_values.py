@@ -112,7 +112,7 @@ def _number_of_text(field, raw, decimal):
     plain = text.replace(",", ".") if decimal != "." else text
     is_number = NUMBER.fullmatch(plain) is not None
     if decimal in (None, IN_TOML):
-        hint = hint_of_text(text, in_cell=decimal is None)
+        hint = hint_of_text(text, in_cell=decimal is None, name=field.name)
         found = message("the_text", "the text {found}", found=shown(raw))
         raise _refused(field, found, hint)
     if is_number and not (decimal == "," and "." in text):
@@ -157,6 +157,8 @@ def _other_unit(field, value):
         return message("is_in_gon", " (is it in gon?)")
     if field.name.startswith("zenith_") and value > field.high:
         return message("second_face", " (in the second face? give the mean of both)")
+    if value < 0 <= field.low < -value <= field.high:
+        return message("is_negative", " (is the sign wrong?)")
     if field.name.endswith("_mm"):
         return message("in_millimetres", " (in millimetres: is it in another unit?)")
     if field.name.endswith("_m"):

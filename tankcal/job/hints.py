@@ -9,13 +9,16 @@ from tankcal.messages import message
 _WITH_UNIT = re.compile(
     r"([+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?)([^\W\d_].{0,11}|[%°'\"′″].{0,5})?"
 )
+_SHARES = {"ppm": 1e-6, "%": 1e-2}
+_OF_SHARES = "_ppm", "_percent"  # ends of keys that are in these units
 _DAYS_OF_OUR_TIME = (18_000, 80_000)  # numbers that spreadsheets have for 1949 to 2119
 
 
-def hint_of_text(text, in_cell=True):
+def hint_of_text(text, in_cell=True, name=""):
     """How to mend a text that looks like a number; "" for one that does not.
 
     in_cell  False: it stands in a TOML file
+    name     of the key, which says its unit
     """
     plain = unicodedata.normalize("NFKC", text).strip().lstrip("'\u2019`").replace(" ", "")
     match = _WITH_UNIT.fullmatch(plain)
@@ -25,6 +28,8 @@ def hint_of_text(text, in_cell=True):
     marks = len(re.findall("[.,]", number))
     if not in_cell:
         whole = number.replace(",", ".") if marks < 2 else "it"
+        if unit in _SHARES and marks < 2 and not name.endswith(_OF_SHARES):
+            whole = f"{float(whole) * _SHARES[unit]:g}"
         return message(
             "without_quotation_marks",
             ", stored as a number: write {whole} without quotation marks",

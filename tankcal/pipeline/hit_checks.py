@@ -15,6 +15,7 @@ from tankcal.pipeline.level_checks import (
     girth_m,
     levels_with_few,
 )
+from tankcal.pipeline.lost_setups import check_lost_setups
 from tankcal.pipeline.moved_setups import (
     critical_of_ranging,
     moved_or_ranged,
@@ -49,6 +50,7 @@ def check_hits(job, wall, sighting):
         *_of_levels(job, wall),
         *_of_courses(job, sighting),
         *_of_incidence(sighting),
+        *check_lost_setups(job, wall, sighting),
         *_of_setups(job, wall, sighting),
         *check_nominal(job, wall, job.hits.file),
         *(() if wall.by_inputs else check_size_told(job, [*job.hits.instruments])),
@@ -141,7 +143,7 @@ def _of_courses(job, sighting):
         text = (
             message(
                 "hits_beyond_ends",
-                "{count} hits are said to be of course {course!r}, but lie beyond the end of the"
+                "hits that are said to be of course {course!r} ({count}) lie beyond the end of the"
                 " shell: is bottom_z_m right, and the height of the instrument?",
                 count=len(places),
                 course=name,
@@ -149,8 +151,9 @@ def _of_courses(job, sighting):
             if not there
             else message(
                 "hits_of_other_course",
-                "{count} hits are said to be of course {course!r}, but lie at the height of course"
-                " {there!r}: is the name wrong, or bottom_z_m, or the height of the instrument?",
+                "hits that are said to be of course {course!r} ({count}) lie at the height of"
+                " course {there!r}: is the name wrong, or bottom_z_m, or the height of the"
+                " instrument?",
                 count=len(places),
                 course=name,
                 there=there,
@@ -205,11 +208,11 @@ def _of_setups(job, wall, sighting):
         text = message(
             "hits_ranged_otherwise",
             "the distances from set-up {setup!r} contradict all others (w = {w:.1f}), as if they"
-            " were {longer_mm:+.1f} mm too long: was the constant of a reflector set, or another"
-            " instrument or mode used?",
+            " were {too_long}: was the constant of a reflector set, or another instrument or mode"
+            " used?",
             setup=setup,
             w=w,
-            longer_mm=1000 * longer,
+            too_long=_too_long(1000 * longer),
         )
         yield Problem("setups.csv", text, job.hits.setups[setup].row, "instrument")
         return
@@ -228,6 +231,12 @@ def _of_setups(job, wall, sighting):
             **worst,
         )
         yield Problem("setups.csv", text, job.hits.setups[worst["setup"]].row, "setup")
+
+
+def _too_long(by_mm):
+    if by_mm < 0:
+        return message("mm_too_short", "{by_mm:.1f} mm too short", by_mm=-by_mm)
+    return message("mm_too_long", "{by_mm:.1f} mm too long", by_mm=by_mm)
 
 
 def causes_unlike_certificates(wall, told, file="instruments.toml", *, taken_off_m):

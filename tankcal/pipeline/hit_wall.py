@@ -10,12 +10,15 @@ from tankcal.job.checks.hits import offset_unknown
 from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import told_causes
 from tankcal.pipeline.misread_hits import refuse_other_units
+from tankcal.pipeline.misread_lines import refuse_misread_heights, refuse_misread_lines
 from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.wall import find_wall, joints_of
 from tankcal.sections import coordinates_of
 from tankcal.survey import wall_points
 from tankcal.survey.poses import covariance_with_points, poses_of
 from tankcal.survey.sighting import Beside, sight
+
+FEWEST_AROUND = 3  # stations that show on which side of the wall they are
 
 
 def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
@@ -52,13 +55,17 @@ def sight_wall(job, adjustment, progress):
         )
     )
     refuse_other_units(job.hits)
+    refuse_misread_lines(job.hits)
+    _refuse_stations_outside(job)
     poses = poses_of(
         job.hits,
         adjustment,
         nominal_m=job.tank.nominal_diameter_m / 2,
         is_inside=job.survey.side == "inside",
     )
-    sighting = replace(sight(job.hits, poses), beside=_targets_beside(job, poses, adjustment))
+    sighting = sight(job.hits, poses)
+    refuse_misread_heights(job, sighting)
+    sighting = replace(sighting, beside=_targets_beside(job, poses, adjustment))
     _refuse_side(job, sighting)
     _refuse_unknown_offset(job, sighting)
     return _as_points(job, sighting)
@@ -112,15 +119,34 @@ def take_points(points, chosen):
 
 def _refuse_side(job, sighting):
     """Raise InputError where all set-ups stand on the other side of the wall than was said."""
-    if np.any(sighting.is_inside == (job.survey.side == "inside")):
+    if not np.any(sighting.is_inside == (job.survey.side == "inside")):
+        raise _on_other_side(job)
+
+
+def _refuse_stations_outside(job):
+    """The same where the stations alone show it: each further from the middle of all than the wall.
+
+    Untied set-ups that see a line of the wall each would not be placed at all. In the tank none has
+    its stations so: the mean of the squared distances from their middle is at most that from the
+    axis.
+    """
+    hits = job.hits
+    used = dict.fromkeys(hits.setups[name].station for name in hits.setup)
+    places = np.array([hits.stations.get(one, np.full(3, np.nan))[:2] for one in used])
+    if job.survey.side != "inside" or len(places) < FEWEST_AROUND:
         return
+    if np.all(np.hypot(*(places - places.mean(axis=0)).T) > job.tank.nominal_diameter_m / 2):
+        raise _on_other_side(job)
+
+
+def _on_other_side(job):
     text = message(
         "hits_on_other_side",
         "found {side}, but all set-ups of the hits stand {other} the tank; expected {other}",
         side=job.survey.side,
         other="inside" if job.survey.side == "outside" else "outside",
     )
-    raise InputError(Problem("job.toml", text, column="survey.side"))
+    return InputError(Problem("job.toml", text, column="survey.side"))
 
 
 def _on_one_side(job, sighting):

@@ -24,6 +24,7 @@ OFF_LEVEL_M = 0.003  # of a strap's radius, from the levels of its course
 SCALE_OF_MEDIAN = 1.4826
 CRITICAL_LEAN = 3.72  # of two slopes together: a chi-square of two exceeds it in 0.1 %
 VERTICALS = 1e-4  # m/m: how alike the verticals of a plummet and of the points are, 20"
+MANY, MANY_LINES = 0.15, 0.5  # of the offsets, and of the lines with one of them, set aside
 FEWEST_LEVELS, FEWEST_ALIKE = 5, 4  # to tell a level, or a copied line, from the others
 
 
@@ -159,6 +160,22 @@ def _set_aside(job, wall):
     places = wall.places[wall.are("offsets")]
     w, _, accepted = wall.tests_of("offsets")
     away = wall.tested.departure_m[wall.are("offsets")]
+    read = [job.lines.offsets[place] for place in places]
+    lost = [one for one, kept in zip(read, accepted, strict=True) if not kept]
+    share_of_lines = len({one.line for one in lost}) / len(job.lines.lines)
+    if len(lost) > MANY * len(read) and share_of_lines > MANY_LINES:
+        text = message(
+            "many_offsets_set_aside",
+            "{count} of {all} offsets, on {lines} lines, depart from what all others show by more"
+            " than their standard deviations of {sd_mm:g} mm (median) allow, and were set aside: is"
+            " s_mm too small, or in another unit?",
+            count=len(lost),
+            all=len(read),
+            lines=len({one.line for one in lost}),
+            sd_mm=1000 * float(np.median([one.sd_m for one in read])),
+        )
+        yield Problem(FILE, text, row=lost[0].row, column="s_mm")
+        return
     for place, of_w, kept, by_m in zip(places, w, accepted, away, strict=True):
         if not kept:
             one = job.lines.offsets[place]

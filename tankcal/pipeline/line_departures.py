@@ -14,6 +14,10 @@ from tankcal.survey.reference_line import rises_of
 
 FILE, RULES = "offsets.csv", "reference_line"
 STEPS_IN, STEPS_IN_SDS = -0.4, 2.0  # of a plate's step that the wall steps in: no build does
+HARDLY, SURE_SDS = (
+    0.25,
+    4.0,
+)  # of a step that shows outside, and sds that it is short of a whole one
 FEWEST_COURSES, LEAST_STEP_M = 4, 1e-3  # whose plates tell that, and by how much these differ
 FEWEST_LINES = 6  # of which one is told from the others
 APART, APART_M = 5.0, 6e-3  # times the rms of most lines, and at least: a line that is apart
@@ -117,3 +121,17 @@ def check_sign(job, levels):
             sd=sd,
         )
         yield Problem(FILE, text, column="offset_mm")
+    elif slope < HARDLY and slope < 1 - SURE_SDS * sd and not _any_inside(job):
+        text = message(
+            "lines_of_inside",
+            "the wall does not come out with its plates ({slope:+.1f} of their step, sd {sd:.1f};"
+            " +1 of plates that are flush inside): did the lines stand inside, or are the plates"
+            " flush outside?",
+            slope=slope,
+            sd=sd,
+        )
+        yield Problem("lines.csv", text, column="side")
+
+
+def _any_inside(job):
+    return any(line.inside for line in job.lines.lines.values())

@@ -33,7 +33,8 @@ def refuse_other_units(hits):
             continue
         factors = product((1.0, GON_IN_DEG, DEG_IN_GON), repeat=2)
         found = {pair: _scatter(hits, mine, *pair) for pair in factors}
-        usual, best = found[1.0, 1.0], min(found, key=found.get)
+        usual = found[1.0, 1.0] = _scatter(hits, mine, 1.0, 1.0, is_part_enough=True)
+        best = min(found, key=found.get)
         if usual < LEAST_M:
             continue
         row = hits.rows[int(np.argmax(mine))] if hits.rows else None
@@ -50,13 +51,16 @@ def refuse_other_units(hits):
         raise InputError(problems)
 
 
-def _scatter(hits, mine, of_direction, of_zenith, *, are_horizontal=False):
-    """Median distance of the hits of a set-up from their circle, m; inf: it sees no whole turn."""
+def _scatter(hits, mine, of_direction, of_zenith, *, are_horizontal=False, is_part_enough=False):
+    """Median distance of the hits of a set-up from their circle, m; inf: it sees no whole turn.
+
+    is_part_enough  True: part of one will do
+    """
     ray = rays(of_direction * hits.direction_rad[mine], of_zenith * hits.zenith_rad[mine])[0]
     places = hits.distance_m[mine, None] * ray
     if are_horizontal:
         places /= np.maximum(np.sin(hits.zenith_rad[mine, None]), LEAST_SINE)
-    if not sees_all_around(places) or np.ptp(places[:, :2], axis=0).min() == 0:
+    if not (is_part_enough or sees_all_around(places)) or np.ptp(places[:, :2], axis=0).min() == 0:
         return np.inf
     local = places[:, :2] - places[:, :2].mean(axis=0)
     x, y, radius = taubin_circle(local)

@@ -224,6 +224,15 @@ def field_of_readings(sites, readings, noise_m2, nominal_m, amplitudes=None):
         sound = np.all(np.isfinite(field.outlines_m))
     except np.linalg.LinAlgError:
         sound = False
+    if not sound and by_lines:
+        raise SolutionError(
+            message(
+                "lines_tell_nothing",
+                "offsets and readings of the tape together show no wall: check s_mm in offsets.csv"
+                " and circumferences.csv, and u_scale_ppm, u_offset_mm, section_mm2 and e_gpa in"
+                " instruments.toml",
+            )
+        )
     if not sound:
         raise SolutionError(
             message(

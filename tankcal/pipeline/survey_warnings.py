@@ -197,13 +197,21 @@ def _with_sd(name, sd_m):
     return message("with_sd", "{name} ({sd_mm:.1f} mm)", name=name, sd_mm=1000 * sd_m)
 
 
+def _shown(job, group):
+    """Name of a section; of tangents, which have that of their course and level, the level."""
+    level = group.name.removeprefix(f"{job.courses[group.course].name} ")
+    if job.tangents is None or level == group.name:
+        return group.name
+    return message("section_at_level", "at {level_m:.3f} m", level_m=float(level))
+
+
 def weak_sections(job, groups, azimuth_rad):
     """Sections with few points, or with a part of the turn that nobody measured."""
     texts = []
     for group in groups:
         ordered = np.sort(azimuth_rad[group.members])
         gap = np.degrees(np.max(np.diff(ordered, append=ordered[0] + 2 * np.pi)))
-        named = {"section": group.name, "course": job.courses[group.course].name}
+        named = {"section": _shown(job, group), "course": job.courses[group.course].name}
         if len(ordered) < ADVISED_POINTS:
             texts.append(
                 message(
@@ -264,8 +272,8 @@ def check_shell(job, shell, sections, given_sd_m):
                     "the radius changes by {jump_mm:.0f} mm from section {below} to section"
                     " {above}: is one of them not the wall?",
                     jump_mm=1000 * jump,
-                    below=below.group.name,
-                    above=above.group.name,
+                    below=_shown(job, below.group),
+                    above=_shown(job, above.group),
                 )
             )
     return _problems(job.points, texts)

@@ -226,9 +226,9 @@ def _of_heights(job, touching):
     for (course, level, other), places in wrong.items():
         text = message(
             "tangents_at_other_level",
-            "{count} tangents of {level:g} m on course {course!r} touch the wall {off:+.2f} m from"
-            " there, on course {other!r}: is the level wrong, or the zenith angle, bottom_z_m or"
-            " the height of the instrument?",
+            "tangents of {level:g} m on course {course!r} ({count}) touch the wall {off:+.2f} m"
+            " from there, on course {other!r}: is the level wrong, or the zenith angle, bottom_z_m"
+            " or the height of the instrument?",
             count=len(places),
             level=level,
             course=course,

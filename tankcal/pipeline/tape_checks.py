@@ -3,13 +3,13 @@
 from itertools import combinations
 
 import numpy as np
-from scipy.special import bdtrc, erf, pdtrc
+from scipy.special import bdtrc, chdtrc, erf, pdtrc
 
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.survey_limits import limits_of
 
-FILE, TAPES = "circumferences.csv", "instruments.toml"
+FILE, TAPES, COMPARED = "circumferences.csv", "instruments.toml", "tape_checks.csv"
 FAHRENHEIT_K = 8.0  # from the shell's: so near a temperature in Fahrenheit is that of the shell
 UNLIKE_K = 20.0  # a tape that is warmer or colder than its shell by more
 CERTIFIED_C = (0.0, 40.0)  # temperatures that certificates are for
@@ -24,8 +24,10 @@ def check_tapes(job, straps):
     """`Problem`s of the tapes of a strapping and of their readings, whatever the wall is."""
     return (
         *_of_temperatures(job, straps),
+        *_of_no_shell_temperature(job, straps),
         *_of_pulls(straps),
         *_of_certificates(straps),
+        *_of_comparisons(job, straps),
         *_of_copies([one.strap for one in straps.reduced]),
     )
 
@@ -55,6 +57,27 @@ def _of_temperatures(job, straps):
                 shell=shell,
             )
         yield Problem(FILE, text, one.strap.row, "temperature_c")
+
+
+def _of_no_shell_temperature(job, straps):
+    """Tapes far from the table's temperature, and nobody says that of their shell."""
+    read = [one.strap.temperature_c for one in straps.reduced]
+    read = [one for one in read if one is not None]
+    base = job.table.reference_temperature_c
+    is_given = job.survey.shell_temperature_c is not None or not job.switches.temperature
+    if is_given or not read:
+        return
+    tape = float(np.median(read))
+    if abs(tape - base) > limits_of("strapping")["shell_unlike_tape_k"]:
+        text = message(
+            "shell_temperature_of_tapes",
+            "blank, so the shell is taken to be at the table's {base:g} degrees Celsius, but the"
+            " tape was at {tape:g}: {ppm:+.0f} ppm of volume if the shell was so, too",
+            base=base,
+            tape=tape,
+            ppm=-2e6 * job.material.expansion_per_k * (tape - base),
+        )
+        yield Problem("job.toml", text, column="survey.shell_temperature_c")
 
 
 def _of_pulls(straps):
@@ -133,6 +156,57 @@ def _of_certificates(straps):
                 most_ppm=most_ppm,
             )
             yield Problem(TAPES, text, column=f"{tape.name}.correction")
+        else:
+            yield from _of_whole_correction(tape, straps)
+
+
+def _of_whole_correction(tape, straps):
+    """Both corrections of a tape together against the length that was read with it."""
+    read = [one.strap.reading_m for one in straps.reduced if one.strap.tape == tape.name]
+    length = float(np.median(read))
+    limit = limits_of("strapping")["class_ii"]
+    most = (limit["mm"] + limit["mm_per_m"] * length) / 1000
+    whole = tape.correction_m + tape.correction * length
+    if tape.correction_m and abs(whole) > most:
+        text = message(
+            "tape_correction_mm_strange",
+            "with correction {found_mm:+.1f} mm of the {length_m:.1f} m that were read; a tape that"
+            " passed a verification is off by no more than {most_mm:.1f} mm: is it in another"
+            " unit, or that of another tape?",
+            found_mm=1000 * whole,
+            length_m=length,
+            most_mm=1000 * most,
+        )
+        yield Problem(TAPES, text, column=f"{tape.name}.correction_mm")
+
+
+def _of_comparisons(job, straps):
+    """Comparisons with a master that differ by more than their standard deviations allow."""
+    used = [tape for tape, _ in straps.tapes if tape.master]
+    strapping = job.strapping if job.great_circles is None else job.great_circles.strapping
+    many = [one for one in strapping.comparisons if one.sd_m > 0]
+    if not used or len(many) < 2:
+        return
+    apart = np.array([one.master_m - one.working_m for one in many])
+    length = np.array([one.working_m for one in many])
+    weight = (length / np.array([one.sd_m for one in many])) ** 2
+    scale = np.sum(weight * apart / length) / np.sum(weight)
+    square = float(np.sum(weight * (apart / length - scale) ** 2))
+    if chdtrc(len(many) - 1, square) < limits_of("strapping")["comparisons_by_chance"]:
+        away = 1000 * (apart - scale * length)
+        worst, least = many[int(np.argmax(away))], many[int(np.argmin(away))]
+        text = message(
+            "comparisons_apart",
+            "{name!r} against its master: the comparisons {one!r} and {other!r} differ by"
+            " {apart_mm:.1f} mm, with standard deviations of {sd_mm:g} mm: was one misread, or the"
+            " tape overstretched between?",
+            name=used[0].name,
+            one=" ".join(filter(None, (worst.level, worst.when))),
+            other=" ".join(filter(None, (least.level, least.when))),
+            apart_mm=float(np.ptp(away)),
+            sd_mm=1000 * float(np.median([one.sd_m for one in many])),
+        )
+        yield Problem(COMPARED, text, column="working_m")
 
 
 def _within(value, limits):

@@ -13,7 +13,7 @@ from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.outlines import FULL_TURN, polar
 from tankcal.geometry.shell import WIDE_BAND, course_of, find_shell
-from tankcal.messages import message
+from tankcal.messages import Message, message
 from tankcal.pipeline.overruled_points import decisions_of, refuse_kept
 from tankcal.pipeline.point_covariance import given_covariance, median_sd, radial_sds
 from tankcal.pipeline.survey_limits import limits_of
@@ -294,10 +294,14 @@ def _shell(job, heights, sds, decided):
         )
     except SolutionError as error:
         if job.hits is not None or job.tangents is not None:
+            found = error.args[0]
+            if not isinstance(found, Message):  # of the adjustment, by its unknowns
+                found = message("no_upright_shell", "the sights show no upright shell")
             hint = message(
                 "told_by_heights",
-                "{error}, bottom_z_m, the heights of the instruments and the units of the angles",
-                error=error.args[0],
+                "{error}; look also at bottom_z_m, survey.side, the heights of the instruments and"
+                " the units of angles and distances",
+                error=found,
             )
             raise SolutionError(hint) from error
         if job.points.from_adjustment:

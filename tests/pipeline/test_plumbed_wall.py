@@ -277,6 +277,14 @@ def other_sign(parts):
         row[3] = -row[3]
 
 
+def from_inside(parts):
+    """Lines in the tank, to the same inside, that are said to stand outside."""
+    other_sign(parts)
+    plate_mm = {row[0]: row[2] for row in parts.tables["courses"][1:]}
+    for row in rows_of(parts):
+        row[3] -= plate_mm[row[1]]
+
+
 def other_end_of_one(parts):
     for row in rows_of(parts):
         row[3] = 500 - row[3] if row[0] == "L4" else row[3]
@@ -307,6 +315,7 @@ PLANTED = {
     "strap_against_lines": strapped_above,
     "strap_against_lines by side": other_side,
     "lines_turned_about": other_sign,
+    "lines_of_inside": from_inside,
     "line_apart": other_end_of_one,
     "offsets_small": centimetres,
     "straps_apart_by_lines": misread_by_a_decimetre,

@@ -20,7 +20,8 @@ from tankcal.record import record_of
 OF_SLIPS = {
     "strap_contradicts", "strapped_course_apart", "lines_turned_about", "hits_ranged_otherwise",
     "large_correction", "strip_upright", "weld_thick", "tangents_of_high_setup",
-    "tape_correction_strange", "control_moved",
+    "tape_correction_strange", "control_moved", "setup_set_aside", "lines_of_inside", "pasted_rows",
+    "plates_too_short", "comparisons_apart", "tape_correction_mm_strange", "many_offsets_set_aside",
 }  # fmt: skip
 SOUND = draws(8, 30)
 
@@ -93,7 +94,30 @@ def height_of_one_instrument(book):
     book.tables["setups"][3]["instrument_height_m"] += 0.1
 
 
+def anticlockwise_circle(book):
+    for row in of_second_setup(book):
+        row["direction_deg"] = round(-row["direction_deg"] % 360, 4)
+
+
+def circle_turned_about(book):
+    for row in of_second_setup(book):
+        row["direction_deg"] = round((row["direction_deg"] + 180) % 360, 4)
+
+
+def hits_of_another_setup(book):
+    """Half of the hits of the second under the name of the first."""
+    for row in of_second_setup(book)[::2]:
+        row["setup"] = "E1"
+
+
+def of_second_setup(book):
+    return [row for row in book.tables["wall_hits"] if row["setup"] == "E2"]
+
+
 SLIPS = [
+    ("three set-ups", anticlockwise_circle, "setup_set_aside"),
+    ("three set-ups", circle_turned_about, "setup_set_aside"),
+    ("three set-ups", hits_of_another_setup, "setup_set_aside"),
     ("strapping", over_a_manhole, "strapped_course_apart"),
     ("hits", one_strap_over_a_manhole, "strap_contradicts"),
     ("lines", levels_from_the_top_down, "lines_turned_about"),

@@ -386,11 +386,11 @@ def no_temperature(parts):
 
 
 def test_a_tape_that_is_hardly_known_makes_a_wide_table(tmp_path):
-    """A scale that is unsure by 10 %, an offset by 10 m, beside readings to a micrometre."""
+    """A scale that is unsure by 10 %, an offset by 10 m, beside readings of 0.02 mm."""
     parts = strapped_parts()
     parts.registers["instruments"]["T-12"] |= {"u_scale_ppm": 1e5, "u_offset_mm": 1e4}
     header, *rows = parts.tables["circumferences"]
-    parts.tables["circumferences"] = [header, *([*row[:4], 1e-3, row[5]] for row in rows)]
+    parts.tables["circumferences"] = [header, *([*row[:4], 0.02, row[5]] for row in rows)]
     result = result_of(parts, tmp_path)
     assert result.table.U_m3[-1] > 0.5 * result.table.volume_m3[-1]
 

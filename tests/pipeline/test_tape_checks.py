@@ -37,6 +37,67 @@ def test_a_correction_that_class_ii_allows_is_quiet(tmp_path):
     assert "tape_correction_strange" not in told(parts, tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("given", "is_told"),
+    [
+        ({"correction_mm": 35.0, "correction": 35e-6}, True),  # of 45 m; 9.3 mm are allowed
+        ({"correction_mm": -35.0, "correction": 35e-6}, True),
+        ({"correction_mm": 12.0, "correction": -100e-6}, False),  # together 7.5 mm
+        ({"correction_mm": 9.0, "correction": 0.0}, False),
+    ],
+)
+def test_both_corrections_of_a_tape_are_judged_together(tmp_path, given, is_told):
+    """OIML R 35-1, class II: 0.3 mm and 0.2 mm a metre, of the length that was read."""
+    parts = strapped_parts()
+    parts.registers["instruments"]["T-12"] |= given
+    assert ("tape_correction_mm_strange" in told(parts, tmp_path)) == is_told
+
+
+def compared(apart_m):
+    """The working tape read at 50 m before and after, so much apart."""
+    parts = strapped_parts()
+    tapes = parts.registers["instruments"]
+    tapes["M-1"] = {**tapes["T-12"]}
+    tapes["T-12"]["master"] = "M-1"
+    parts.tables["circumferences"][0].append("instrument")
+    for row in parts.tables["circumferences"][1:]:
+        row.append("T-12")
+    parts.tables["tape_checks"] = [
+        ["level", "master_m", "working_m", "s_mm", "when"],
+        ["2", 50.0, 50.0, 0.3, "before"],
+        ["2", 50.001, 50.001 - apart_m, 0.3, "after"],
+    ]
+    return parts
+
+
+def test_comparisons_with_a_master_that_contradict_each_other_are_named(tmp_path):
+    """Closed form: of two with 0.3 mm each, 3.29 sqrt(2) 0.3 mm = 1.4 mm by one chance of 1000."""
+    for apart_m, is_told in ((0.020, True), (1.5e-3, True), (1.3e-3, False)):
+        found = told(compared(apart_m), tmp_path)
+        assert ("comparisons_apart" in found) == is_told
+    assert "2 after" in told(compared(0.020), tmp_path)["comparisons_apart"]
+
+
+def test_seams_that_no_plates_have_are_named(tmp_path):
+    for count, is_told in ((4.0, False), (30.0, False), (40.0, True)):
+        parts = strapped_parts()
+        parts.tables["obstructions"][1][2] = count
+        assert ("plates_too_short" in told(parts, tmp_path)) == is_told
+
+
+def test_a_shell_of_no_temperature_is_told_where_the_tape_was_warm(tmp_path):
+    """Closed form: 2 a (T - T_table) of volume, 11 K: 242 ppm."""
+    for celsius, is_told in ((31.0, True), (24.0, False)):
+        parts = strapped_parts(survey__shell_temperature_c=None)
+        parts.tables["circumferences"][0].append("temperature_c")
+        for row in parts.tables["circumferences"][1:]:
+            row.append(celsius)
+        found = told(parts, tmp_path)
+        assert ("shell_temperature_of_tapes" in found) == is_told
+        assert not is_told or "-242 ppm" in found["shell_temperature_of_tapes"]
+    assert "shell_temperature_of_tapes" not in told(strapped_parts(), tmp_path)
+
+
 def test_the_unit_of_a_pull_is_named(tmp_path):
     """60 N written as 6.1 kgf, and as 13.5 lbf."""
     for pull, unit in ((6.1, "kgf"), (13.5, "lbf")):

@@ -122,7 +122,8 @@ def _common_values(sites, nominal_m):
         missed = [i for i, one in common if one.shape == "seam"]
     columns = np.hstack([around, *values.values()])
     if sites.shared is not None:
-        columns = np.hstack([columns, sites.shared / np.abs(sites.shared).max(axis=0)])
+        most = np.abs(sites.shared).max(axis=0)  # 0: of no reading that is left
+        columns = np.hstack([columns, sites.shared / np.where(most > 0, most, 1.0)])
     spread, used = np.zeros((len(common), columns.shape[1], columns.shape[1])), around.shape[1]
     for row, (_, one) in enumerate(common):
         if row in values:

@@ -7,7 +7,7 @@ from tankcal.job.checks.extent import has_hits, has_survey, tells_by_tape
 from tankcal.job.checks.strapping import refuse_others, tapes_of
 from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
 from tankcal.job.checks.survey.instruments import check_correction
-from tankcal.job.checks.survey.readings import check_angle
+from tankcal.job.checks.survey.readings import check_angle, warn_copies
 from tankcal.job.contract.registers import FREE
 from tankcal.messages import message
 
@@ -84,6 +84,7 @@ def _check_readings(files, table, *, is_needed):
     refuse_undefined(files, table, "setup", defined, "setups")
     for angle in ("direction", "zenith"):
         check_angle(files, table, angle, is_needed=is_needed)
+    warn_copies(files, table, are_sights=True)
 
 
 def ranging_of(registers):

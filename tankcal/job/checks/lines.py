@@ -6,6 +6,7 @@ from tankcal.job.checking import has_rows, refuse_repeated, tell_missing
 from tankcal.job.checks.extent import has_wall_points, is_strapped
 from tankcal.job.checks.strapping import (
     check_levels,
+    names_of,
     refuse_free_scale,
     refuse_others,
     tapes_of,
@@ -68,7 +69,7 @@ def check_lines(values, tables, registers, raw, log):
     _check_plummets(lines, offsets, plummets, raw, log)
     courses = tables["courses"]
     known = () if courses is None else tuple(courses.of("course"))
-    refuse_others(offsets, "line", tuple(lines.of("line")), log)
+    refuse_others(offsets, "line", names_of(lines, "line"), log)
     refuse_others(offsets, "course", known, log)
     for row, face in zip(offsets.rows, offsets.of("face"), strict=True):
         if face is not None and face != int(face):
@@ -243,7 +244,7 @@ def _check_coverage(lines, offsets, log):
             told.add(first)
             expected = message(
                 "level_of_few_lines",
-                "{level:g} m of course {course!r} is read on {count} lines; expected {fewest} at"
+                "lines that read {level:g} m of course {course!r}: {count}; expected {fewest} at"
                 " least",
                 level=level[place],
                 course=course[place],

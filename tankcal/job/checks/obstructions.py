@@ -4,10 +4,14 @@ from tankcal.job.contract.strapping import NEEDED
 from tankcal.messages import message
 
 THICK_WELD_MM = 5.0
+ONE_A_PLATE, LEAST_PLATE_M = ("butt_strap", "weld", "lap"), 1.2  # at upright seams of plates
 
 
-def check_obstructions(table, log):
-    """The lengths that obstructions of each kind need, and whether they can be meant."""
+def check_obstructions(table, straps, log):
+    """The lengths that obstructions of each kind need, and whether they can be meant.
+
+    straps  readings of the circumferences that they are on
+    """
     for place, (row, kind) in enumerate(zip(table.rows, table.of("kind"), strict=True)):
         for column in NEEDED.get(kind, ()):
             if table.of(column)[place] is None and not log.has(table.file, row, column):
@@ -28,6 +32,9 @@ def check_obstructions(table, log):
                 arc=arc,
             )
             log.problem(table.file, expected, row, "over_mm")
+    _check_counts(
+        table, dict(zip(straps.of("circumference"), straps.of("reading_m"), strict=True)), log
+    )
 
 
 def _check_sizes(table, place, log):
@@ -53,3 +60,25 @@ def _check_sizes(table, place, log):
             most=THICK_WELD_MM,
         )
         log.warning(table.file, expected, row, "thickness_mm")
+
+
+def _check_counts(table, reading_m, log):
+    """Warn of seams that follow each other as no plates are cut.
+
+    reading_m  {circumference: length of it}
+    """
+    columns = (table.of(name) for name in ("circumference", "kind", "count"))
+    for row, name, kind, count in zip(table.rows, *columns, strict=True):
+        length = reading_m.get(name)
+        if kind not in ONE_A_PLATE or not count or length is None or count < 3:
+            continue
+        if length / count < LEAST_PLATE_M:
+            expected = message(
+                "plates_too_short",
+                "{count:g} round {length_m:.1f} m: one at each seam would make plates of"
+                " {plate_m:.2f} m; is the count that of this circumference?",
+                count=count,
+                length_m=length,
+                plate_m=length / count,
+            )
+            log.warning(table.file, expected, row, "count")

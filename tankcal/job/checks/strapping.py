@@ -63,9 +63,9 @@ def check_readings(straps, tables, registers, raw, log):
     _check_tapes(straps, registers["instruments"], tapes, raw, log)
     _check_pulls(straps, log)
     if has_rows(tables["obstructions"]):
-        names = set(straps.of("circumference"))
+        names = names_of(straps, "circumference")
         refuse_others(tables["obstructions"], "circumference", names, log)
-        check_obstructions(tables["obstructions"], log)
+        check_obstructions(tables["obstructions"], straps, log)
         check_spans(tables["obstructions"], straps, tapes_read(straps, tapes), tapes, raw, log)
     _check_comparisons(tables["tape_checks"], tapes, raw, log)
 
@@ -163,6 +163,11 @@ def refuse_repeats_elsewhere(straps, column, log):
                 row=first[1],
             )
             log.problem(straps.file, expected, row, column)
+
+
+def names_of(table, column):
+    """The names of a table; none where a row of it was dropped, which is told already."""
+    return () if table.skipped else tuple(table.of(column))
 
 
 def refuse_others(table, column, known, log):

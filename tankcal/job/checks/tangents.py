@@ -6,7 +6,7 @@ from tankcal.job.checking import has_rows, tell
 from tankcal.job.checks.extent import has_survey, has_tangents
 from tankcal.job.checks.strapping import check_levels, refuse_others
 from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
-from tankcal.job.checks.survey.readings import check_angle
+from tankcal.job.checks.survey.readings import check_angle, warn_copies
 from tankcal.messages import message
 
 MOST_TANGENTS = 2500  # whose full covariance is kept
@@ -54,6 +54,7 @@ def check_tangents(values, tables, registers, raw, log):
     refuse_undefined(files, table, "setup", defined, "setups")
     check_angle(files, table, "direction")
     check_angle(files, table, "zenith", is_needed=False)
+    warn_copies(files, table, are_sights=True)
     courses = tables["courses"]
     if courses is not None:
         refuse_others(table, "course", tuple(courses.of("course")), log)

@@ -33,7 +33,7 @@ COLUMNS = (
 )
 
 MAX_POINTS = 50_000
-TINY_SD_MM = 0.01
+TINY_SD_MM, SURELY_TINY_SD_MM = 0.01, 0.0001
 
 
 def check_points(points, log):
@@ -69,7 +69,8 @@ def check_points(points, log):
     for name in given:
         found = [sd for sd in points.of(name) if sd is not None]
         if found and max(found) < TINY_SD_MM:
-            log.warning(points.file, tiny_sd("mm", max(found)), None, name)
+            tell = log.problem if max(found) < SURELY_TINY_SD_MM else log.warning
+            tell(points.file, tiny_sd("mm", max(found)), None, name)
 
 
 def _warn_same_places(points, log):

@@ -195,7 +195,13 @@ INSTRUMENT = (
         low=-60,
         high=90,
     ),
-    Field("tension_n", "number", "pull of a tape, newtons; printed", low=0, high=1000),
+    Field(
+        "tension_n",
+        "number",
+        "pull that the certificate of a tape is for, newtons",
+        low=0,
+        high=1000,
+    ),
     Field("expansion_per_k", "number", "thermal expansion of a tape, 1/K", low=0, high=1e-4),
     Field(
         "correction",

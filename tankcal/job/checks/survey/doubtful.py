@@ -90,6 +90,7 @@ def _measured(table):
 
 
 TINY = {"mm": 0.005, "um": 0.05, "arcsec": 0.01}  # sds: all below that are doubted
+SURE = 0.1  # part of that, below which those of readings are refused
 OF_SDS = {
     **dict.fromkeys(("s_mm", "sx_mm", "sy_mm", "sz_mm"), "mm"),
     **dict.fromkeys(("sx_um", "sy_um", "s_um"), "um"),
@@ -127,7 +128,9 @@ def _warn_tiny_sds(files, name, table):
         sd = table.numbers(column)
         given = sd[sd > 0]
         if len(given) and given.max() < TINY[unit]:
-            files.log.warning(table.file, tiny_sd(unit, given.max()), None, column)
+            is_sure = name in READINGS and given.max() < SURE * TINY[unit]
+            tell = files.log.problem if is_sure else files.log.warning
+            tell(table.file, tiny_sd(unit, given.max()), None, column)
 
 
 def _check_size(files, places):

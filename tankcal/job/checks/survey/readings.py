@@ -8,6 +8,7 @@ from tankcal.errors import SHEET
 from tankcal.job.checking import has_rows
 from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.checks.survey.instruments import TAKEN_FROM_SETUPS
+from tankcal.job.checks.survey.packed_dms import refuse_packed
 from tankcal.job.contract.observations import ANGLE_UNITS, ANGLES, READINGS
 from tankcal.messages import join_with_or, list_some, message
 
@@ -126,11 +127,11 @@ def check_readings(files):
         if name in ANGLES:
             check_angle(files, table, ANGLES[name])
         _refuse_same_ends(files, name, table)
-        _warn_copies(files, table)
+        warn_copies(files, table)
     if has_rows(files.tables["directions"]):
         _warn_single_directions(files, files.tables["directions"])
     if has_rows(files.tables["image_points"]):
-        _warn_copies(files, files.tables["image_points"])
+        warn_copies(files, files.tables["image_points"])
 
 
 def check_angle(files, table, angle, *, is_needed=True):
@@ -156,6 +157,8 @@ def check_angle(files, table, angle, *, is_needed=True):
         "angle_in_two_units", "in two units; expected one of {wanted}", wanted=wanted
     )
     tell_rows(files.log.problem, table, twice, first, expected)
+    if f"{angle}_deg" in headings:
+        refuse_packed(table, f"{angle}_deg", files.log)
 
 
 def files_name(table):
@@ -197,8 +200,11 @@ def _refuse_same_ends(files, name, table):
         files.log.problem(table.file, expected, row, "to")
 
 
-def _warn_copies(files, table):
-    """Rows that are the same to the last digit, more than chance brings; one warning for a file."""
+def warn_copies(files, table, *, are_sights=False):
+    """Rows that are the same to the last digit, more than chance brings; one warning for a file.
+
+    are_sights  of the wall, of which chance brings none that are alike
+    """
     raw = files.raw.tables[files_name(table)]
     first, copies = {}, []
     for row, cells in zip(raw.row_numbers, raw.rows, strict=True):
@@ -210,12 +216,24 @@ def _warn_copies(files, table):
             copies.append((row, before))
     if len(copies) <= BY_CHANCE * len(raw.rows):
         return
-    expected = message(
-        "copied_rows",
-        "{count} rows are the same as another one to the last digit (rows {pairs}): were "
-        "they copied? Each counts as a separate reading",
-        count=len(copies),
-        pairs=list_some([f"{row} = {before}" for row, before in copies], MOST_REPEATED),
+    told = {
+        "count": len(copies),
+        "pairs": list_some([f"{row} = {before}" for row, before in copies], MOST_REPEATED),
+    }
+    expected = (
+        message(
+            "pasted_rows",
+            "{count} rows are the same as another one to the last digit (rows {pairs}): was a part"
+            " of the file pasted twice?",
+            **told,
+        )
+        if are_sights
+        else message(
+            "copied_rows",
+            "{count} rows are the same as another one to the last digit (rows {pairs}): were "
+            "they copied? Each counts as a separate reading",
+            **told,
+        )
     )
     files.log.warning(table.file, expected, copies[0][0])
 
