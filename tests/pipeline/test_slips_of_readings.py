@@ -37,6 +37,15 @@ def test_standard_deviations_in_metres_are_refused(tmp_path, kind, table, column
     assert problems_of(tmp_path, book) == [("sd_below_any_mm", 2, column)]
 
 
+def test_standard_deviations_that_nobody_reads_are_asked_about(tmp_path):
+    """Readings may be made up without errors, to check a formula."""
+    book = book_of("strapping", 1002)
+    for row in book.tables["circumferences"]:
+        row["s_mm"] = 0.01
+    job = tankcal.load(write_folder(tmp_path, book.parts()))
+    assert "sd_below_any_mm" in {one.expected.code for one in job.warnings}
+
+
 def test_standard_deviations_of_an_instrument_in_other_units_are_refused(tmp_path):
     book = book_of("hits", 1002)
     name = "ET-5"

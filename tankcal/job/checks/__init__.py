@@ -32,7 +32,7 @@ from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.strapping import check_strapping
 from tankcal.job.checks.survey import check_survey
 from tankcal.job.checks.tangents import check_tangents
-from tankcal.job.checks.tiny_sds import refuse_tiny_sds
+from tankcal.job.checks.tiny_sds import check_tiny_sds
 from tankcal.job.contract.bottom import check_bottom
 from tankcal.job.contract.correlations import check_correlations
 from tankcal.job.contract.courses import check_courses
@@ -71,7 +71,7 @@ def check_all(values, tables, registers, raw, is_whole, log):
             check_rings(values, tables, registers, raw, log)
         if kind_of(raw) == "sphere":
             check_great_circles(values, tables, registers, raw, log)
-        refuse_tiny_sds(tables, registers, raw, log)
+        check_tiny_sds(tables, registers, raw, log)
         check_clouds(values, tables, registers, raw, log)
         check_liquid(values, tables, registers, raw, log)
         if values is not None:
