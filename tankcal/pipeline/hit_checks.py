@@ -281,10 +281,10 @@ def causes_unlike_certificates(wall, told, file="instruments.toml", *, taken_off
 
 
 def _strange_offset(one, taken_off_m, file):
-    """An offset that nobody certified, and that is larger than instruments have."""
+    """An offset that nobody certified, and that is surely larger than instruments have."""
     most = limits_of(RULES)["most_offset_mm"] / 1000
     value = one.value + taken_off_m
-    if abs(value) > most:
+    if abs(value) > most + UNLIKE_SDS * one.u_after:
         text = message(
             "offset_strange",
             "straps and wall make the offset of {name} {value_mm:+.2f} mm; on a bare wall it is"

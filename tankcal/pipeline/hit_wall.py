@@ -12,32 +12,38 @@ from tankcal.pipeline.cause_correlations import told_causes
 from tankcal.pipeline.misread_hits import refuse_other_units
 from tankcal.pipeline.misread_lines import refuse_misread_heights, refuse_misread_lines
 from tankcal.pipeline.point_covariance import s_transform
+from tankcal.pipeline.untied_setups import pose_changes
 from tankcal.pipeline.wall import find_wall, joints_of
 from tankcal.sections import coordinates_of
 from tankcal.survey import wall_points
-from tankcal.survey.poses import covariance_with_points, poses_of
+from tankcal.survey.poses import covariance_with_points, poses_of, settled
 from tankcal.survey.sighting import Beside, sight
 
 FEWEST_AROUND = 3  # stations that show on which side of the wall they are
+ROUNDS = 3  # of the wall, where it tells offsets or places
+SETTLED = 1e-4  # m, rad: by less these do not change any more
 
 
 def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
     """The job with its hits as points, their `Sighting`, and the `Wall` that they show.
 
-    Offsets that nothing but the wall tells are taken off, and it is found once more.
+    What nothing but the wall tells is taken off, and the wall is found again: offsets of
+    instruments, and how far set-ups stand from where they were placed, so that sections and all
+    that is said of points are those of the wall in the table.
 
     adjustment  of the network that the set-ups belong to; None: there is none
     dof, amplitudes  as in `find_wall`
     """
     job, sighting = sight_wall(job, adjustment, progress)
-    wall = find_wall(job, progress, dof, amplitudes)
-    told = told_causes(job, wall)
-    free = {one.name: one.value for one in told if np.isinf(one.u_before)}
-    if free:
-        again = sight(job.hits, sighting.poses, free)
-        job, sighting = _as_points(job, replace(again, beside=sighting.beside))
+    for left in reversed(range(ROUNDS)):
         wall = find_wall(job, progress, dof, amplitudes)
-        told = told_causes(job, wall)
+        told, change = told_causes(job, wall), pose_changes(job, wall)
+        more = {one.name: one.value for one in told if np.isinf(one.u_before)}
+        if not left or np.abs([*more.values(), *change]).max(initial=0.0) < SETTLED:
+            break
+        again = sight(job.hits, settled(sighting.poses, change), more)
+        offsets = {name: sighting.told_m.get(name, 0.0) + value for name, value in more.items()}
+        job, sighting = _as_points(job, replace(again, beside=sighting.beside, told_m=offsets))
     return job, replace(sighting, told=told), wall
 
 

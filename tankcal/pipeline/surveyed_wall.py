@@ -97,16 +97,20 @@ class Wall:
             return found
         outside = job.survey.side == "outside"  # a reading sees a plate that is not taken off it
         taken = [one.by_inputs.get("plate_thickness", 0.0) for one in self.readings]
-        sees = np.append(np.full(self._points, outside), outside - np.array(taken))
+        sees = np.append(np.full(self.points_read, outside), outside - np.array(taken))
         gauged = {} if self.straps is None else self.straps.plate_sd_m
         plates = factors_of_plates(names_of(job.courses), self.field, weights * sees, gauged)
-        return (*found, *factors_of_readings(self.readings, weights[:, self._points :]), *plates)
+        return (
+            *found,
+            *factors_of_readings(self.readings, weights[:, self.points_read :]),
+            *plates,
+        )
 
     def read_with(self, weights):
         """{input: (f,) derivative of features}: plates that points on the other side were moved
         through; the temperature that a tape has of the shell, plates that points inside do not see.
         """
-        found = inputs_read_with(self.readings, weights[:, self._points :])
+        found = inputs_read_with(self.readings, weights[:, self.points_read :])
         for name, column in self.by_inputs.items():
             found[name] = found.get(name, 0.0) + weights @ column
         return found
@@ -117,5 +121,6 @@ class Wall:
         return [] if self.read is None else self.read.accepted
 
     @property
-    def _points(self):
+    def points_read(self):
+        """How many readings of the field are of points."""
         return len(self.field.radius_m) - len(self.readings)

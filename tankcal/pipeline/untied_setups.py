@@ -16,6 +16,7 @@ from tankcal.sections import coordinates_of
 
 MOVED_M, TURNED_RAD = 0.3, 0.05  # how far off a pose that the wall alone ties may be
 LEAST_MOTION_M = 0.005  # of all its radii together by that: less is no unknown of the wall
+SURE = 0.1  # sd of a way, as a part of these: what is told more poorly moves no set-up
 
 
 @dataclass(frozen=True)
@@ -78,9 +79,36 @@ def unbound_of(points, by_points, accepted):
     columns = {False: [], True: []}
     for one in points.unbound:
         is_pose = one.what == "pose"
-        size = 1.0 if not is_pose else MOVED_M if one.unit == "m" else TURNED_RAD
+        size = _sizes([one.unit])[0] if is_pose else 1.0
         columns[is_pose].append(size * (by_points @ one.column_m[index]))
     return Unbound(*(_stacked(columns[is_pose], by_points.shape[0]) for is_pose in (False, True)))
+
+
+def pose_changes(job, wall):
+    """(k,) by how much the poses of set-ups, as `unbound` of the points has them, are off.
+
+    What the wall tells of its shared columns, brought back to x, y (m) and orientation (rad) of
+    each set-up, as far as the radii tell these well where offsets are as they were found: a way
+    that hardly moves any radius is known to decimetres only, and nothing hangs on it.
+    """
+    count = wall.points_read
+    unbound = unbound_of(job.points, wall.radii_by_points[:count], wall.accepted)
+    if not unbound.poses.shape[1] or wall.field.sites.shared is None:
+        return np.zeros(unbound.poses.shape[1])
+    free = unbound.offsets.shape[1]
+    values, covariance = wall.field.shared
+    covariance = covariance[:, -len(values) :]
+    across, own = covariance[free:, :free], covariance[:free, :free]
+    beside = covariance[free:, free:] - across @ np.linalg.pinv(own) @ across.T
+    variance, axes = np.linalg.eigh(beside)
+    known = axes[:, variance < SURE**2]
+    moved = wall.field.sites.shared[:count, free:] @ (known @ (known.T @ values[free:]))
+    units = [one.unit for one in job.points.unbound if one.what == "pose"]
+    return -_sizes(units) * np.linalg.lstsq(unbound.poses, moved, rcond=None)[0]
+
+
+def _sizes(units):
+    return np.array([MOVED_M if one == "m" else TURNED_RAD for one in units])
 
 
 def _stacked(columns, count):

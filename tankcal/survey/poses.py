@@ -106,6 +106,20 @@ def _in_network(hits, poses, adjustment):
     return Poses(poses.keys, xyz, zero, poses.instruments, scale, offset, covariance, tuple(ties))
 
 
+def settled(poses, change):
+    """The poses with those that the wall alone ties where it has them.
+
+    change  (k,) of x, y (m) and orientation (rad) of each of these, one after another
+    """
+    if not np.any(change):
+        return poses
+    free = [i for i, tie in enumerate(poses.ties) if tie == WALL]
+    moved, xyz, zero = np.reshape(change, (-1, 3)), poses.xyz_m.copy(), poses.orientation_rad.copy()
+    xyz[free, :2] += moved[:, :2]
+    zero[free] += moved[:, 2]
+    return replace(poses, xyz_m=xyz, orientation_rad=zero)
+
+
 def covariance_with_points(hits, poses, adjustment, names):
     """(u, 3 k) covariance of all that `Poses.covariance` is of with the coordinates of points of
     the same network, by their names.

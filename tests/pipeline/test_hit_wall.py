@@ -442,6 +442,9 @@ PAGE = {
 }
 
 
+AROUND = np.linspace(0, 2 * np.pi, 90, endpoint=False)
+
+
 def line_parts(longer_m=0.0, scale=0.0):
     """Parts of the page of worked numbers, section 2: six lines by total station, and a strap."""
     rows = []
@@ -555,7 +558,8 @@ def test_untied_set_ups_walked_anticlockwise(tmp_path):
     heading, *rows = parts.tables["wall_hits"]
     parts.tables["wall_hits"] = [heading, *sorted(rows, key=lambda row: row[0], reverse=True)]
     other = run(tmp_path / "b", parts)
-    assert other.table.volume_m3[-1] == pytest.approx(clockwise.table.volume_m3[-1], rel=1e-5)
+    apart = other.table.volume_m3[-1] - clockwise.table.volume_m3[-1]
+    assert abs(apart) < 0.05 * clockwise.table.U_m3[-1]  # ways that nothing tells start elsewhere
     assert np.hypot(*other.wall.shell.slope) == pytest.approx(
         np.hypot(*clockwise.wall.shell.slope), abs=2e-6
     )
@@ -582,6 +586,14 @@ def test_stations_in_another_order_are_refused(tmp_path, slip, told):
     assert problem.file == told
     assert slip.__name__ in problem.expected.code
     assert told == "control.csv" or {"'S1'", "'S3'"} <= set(str(problem).split())
+
+
+@pytest.mark.slow
+def test_sections_of_untied_set_ups_are_those_of_the_wall(tmp_path):
+    """Property: a strap moves set-ups that see a line each, and so what is said of their hits."""
+    result = run(tmp_path, line_parts(longer_m=0.004))
+    of_outlines = [one.outline.radius_m(AROUND).mean() for one in result.wall.sections]
+    assert of_outlines == pytest.approx(radii_of(result), abs=2e-4)
 
 
 @pytest.mark.slow
