@@ -11,6 +11,7 @@ import scipy.sparse
 
 from tankcal.geometry.circles import (
     Circle,
+    circle_by_points,
     fit_circle,
     own_columns,
     radial_covariance,
@@ -436,6 +437,15 @@ def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
         outline = smooth_outline(xy, *centre, noise, form_m2, away, group.degree)
     by_points = own_columns(radii_by_coordinates(outline, xy) @ _by_own(slope))
     return Section(group, circle, outline, by_points)
+
+
+def circle_by_coordinates(section, xyz_m, covariance_m2, slope, z_m):
+    """(3, 3n) derivative of x, y and radius of a section's circle by x, y, z of its points.
+
+    xyz_m, covariance_m2, slope, z_m  as in `fit_section`, which it came from
+    """
+    by_xy = circle_by_points(section.circle, *_in_plan(xyz_m, covariance_m2, slope, z_m))
+    return (by_xy.reshape(3, -1, 2) @ _by_own(slope)).reshape(3, -1)
 
 
 def _zeta(group, xyz_m, z_m):

@@ -91,6 +91,39 @@ def fit_circle(xy_m, covariance_m2):
     )
 
 
+def circle_by_points(circle, xy_m, covariance_m2):
+    """Derivative of x, y and radius of a circle of `fit_circle` by its points.
+
+    Parameters
+    ----------
+    circle : Circle
+    xy_m, covariance_m2
+        That it was fitted with.
+
+    Returns
+    -------
+    ndarray, shape (3, 2n)
+
+    Examples
+    --------
+    Points on the axes: the radius is the mean of their distances.
+
+    >>> xy = np.array([[1.0, 0], [0, 1], [-1, 0], [0, -1]])
+    >>> by = circle_by_points(fit_circle(xy, np.eye(8)), xy, np.eye(8))
+    >>> by[2].round(9).reshape(4, 2).tolist()
+    [[0.25, 0.0], [0.0, 0.25], [-0.25, 0.0], [0.0, -0.25]]
+    """
+    given = np.array([circle.x_m, circle.y_m, circle.radius_m])
+    _, by_circle, unit = _conditions_of_points(given, np.asarray(xy_m, dtype=float).ravel())
+    spread = radial_covariance(xy_m, given[:2], covariance_m2)
+    if np.ndim(spread) == 1:
+        weighted = by_circle.T / spread
+    else:
+        weighted = np.linalg.solve(spread, by_circle).T
+    by_radii = -np.linalg.solve(weighted @ by_circle, weighted)
+    return (by_radii[:, :, None] * unit).reshape(3, -1)
+
+
 def circle_conditions(unknowns, coordinates):
     """Misclosures and Jacobians of hypot(x - xc, y - yc) - R = 0, a model for `adjust`.
 

@@ -12,7 +12,6 @@ from tankcal.pipeline.cause_correlations import told_causes
 from tankcal.pipeline.misread_hits import refuse_other_units
 from tankcal.pipeline.misread_lines import refuse_misread_heights, refuse_misread_lines
 from tankcal.pipeline.point_covariance import s_transform
-from tankcal.pipeline.untied_setups import pose_changes
 from tankcal.pipeline.wall import find_wall, joints_of
 from tankcal.sections import coordinates_of
 from tankcal.survey import wall_points
@@ -20,8 +19,8 @@ from tankcal.survey.poses import covariance_with_points, poses_of, settled
 from tankcal.survey.sighting import Beside, sight
 
 FEWEST_AROUND = 3  # stations that show on which side of the wall they are
-ROUNDS = 3  # of the wall, where it tells offsets or places
-SETTLED = 1e-4  # m, rad: by less these do not change any more
+ROUNDS = 4  # in which the wall tells offsets or places
+SETTLED_M = 1e-5  # what moves no hit by more has settled
 
 
 def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
@@ -35,16 +34,20 @@ def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
     dof, amplitudes  as in `find_wall`
     """
     job, sighting = sight_wall(job, adjustment, progress)
-    for left in reversed(range(ROUNDS)):
-        wall = find_wall(job, progress, dof, amplitudes)
-        told, change = told_causes(job, wall), pose_changes(job, wall)
-        more = {one.name: one.value for one in told if np.isinf(one.u_before)}
-        if not left or np.abs([*more.values(), *change]).max(initial=0.0) < SETTLED:
+    wall, sizes = find_wall(job, progress, dof, amplitudes), None
+    for _ in range(ROUNDS):
+        told = wall.told
+        if told is None or told.largest_m < SETTLED_M:
             break
-        again = sight(job.hits, settled(sighting.poses, change), more)
-        offsets = {name: sighting.told_m.get(name, 0.0) + value for name, value in more.items()}
+        if len(told.poses):  # they take up a part of the form that further rounds would see
+            sizes = wall.field.amplitudes
+        poses = settled(sighting.poses, told.poses)
+        again = sight(job.hits, poses, told.offsets_m)
+        offsets = {name: sighting.told_m.get(name, 0.0) + more
+                   for name, more in told.offsets_m.items()}  # fmt: skip
         job, sighting = _as_points(job, replace(again, beside=sighting.beside, told_m=offsets))
-    return job, replace(sighting, told=told), wall
+        wall = find_wall(job, progress, dof, amplitudes, sizes=sizes)
+    return job, replace(sighting, told=told_causes(job, wall)), wall
 
 
 def sight_wall(job, adjustment, progress):

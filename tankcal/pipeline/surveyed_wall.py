@@ -8,6 +8,7 @@ import scipy.sparse
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.shell import Shell
 from tankcal.pipeline.read_wall import ReadWall
+from tankcal.pipeline.told_unknowns import ToldUnknowns
 from tankcal.pipeline.undecided_columns import factors_of_undecided
 from tankcal.pipeline.wall_readings import (
     factors_of_plates,
@@ -56,6 +57,8 @@ class Wall:
     origins_m : ndarray, shape (sections, 2)
         x and y that the radii of each section were taken about, in the frame of the points: the
         field's centres count from there.
+    told : ToldUnknowns or None
+        Of offsets and poses that nothing binds beforehand; None: there are none.
     """
 
     shell: Shell
@@ -72,6 +75,7 @@ class Wall:
     by_inputs: dict = field(default_factory=dict)
     without_inputs: tuple = ()
     origins_m: np.ndarray | None = None
+    told: ToldUnknowns | None = None
     surveyed_as = "wall"
 
     def lowest_outline(self, azimuth_rad):
@@ -79,6 +83,16 @@ class Wall:
         outline, height = self.sections[0].outline, self.sections[0].group.height_m
         x, y = np.array([outline.x_m, outline.y_m]) - height * np.array(self.shell.slope)
         return x, y, outline.radius_m(azimuth_rad)
+
+    def spread_of(self, by_points, members):
+        """(r, r) covariance of functions of some accepted points, with what was told of poses and
+        offsets.
+
+        by_points  (r, 3k) their derivative by the coordinates of these, members (k,)
+        """
+        index = coordinates_of(members)
+        own = by_points @ (self.covariance_m2[index][:, index] @ by_points.T)
+        return own if self.told is None else own + self.told.spread_of(by_points, members)
 
     def factors(self, job, weights):
         """`Factor`s of what the points leave uncertain about features, (f, m) by the readings."""

@@ -8,6 +8,7 @@ only the rest of its ways are unknowns.
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg
 
 from tankcal.errors import SolutionError
 from tankcal.geometry.field.sites import free_design
@@ -16,7 +17,6 @@ from tankcal.sections import coordinates_of
 
 MOVED_M, TURNED_RAD = 0.3, 0.05  # how far off a pose that the wall alone ties may be
 LEAST_MOTION_M = 0.005  # of all its radii together by that: less is no unknown of the wall
-SURE = 0.1  # sd of a way, as a part of these: what is told more poorly moves no set-up
 
 
 @dataclass(frozen=True)
@@ -69,6 +69,16 @@ class Unbound:
         chosen = self.poses @ ways[size > LEAST_MOTION_M].T  # not `left`: radii stay what they are
         return replace(sites, shared=np.hstack([self.offsets, chosen]))
 
+    def ways_of(self, sites):
+        """(k + m, s) by what of each of these the columns move that sites share, but for those of
+        lines: they move no point.
+        """
+        count, k = self.offsets.shape
+        columns = sites.shared[:count]
+        chosen = columns[:, columns.any(axis=0)][:, k:]
+        ways = np.linalg.lstsq(self.poses, chosen, rcond=None)[0]
+        return scipy.linalg.block_diag(np.eye(k), ways)
+
 
 def unbound_of(points, by_points, accepted):
     """`Unbound` of the radii of a wall.
@@ -77,38 +87,21 @@ def unbound_of(points, by_points, accepted):
     """
     index = coordinates_of(accepted)
     columns = {False: [], True: []}
-    for one in points.unbound:
-        is_pose = one.what == "pose"
-        size = _sizes([one.unit])[0] if is_pose else 1.0
-        columns[is_pose].append(size * (by_points @ one.column_m[index]))
+    for one in offsets_then_poses(points):
+        columns[one.what == "pose"].append(size_of(one) * (by_points @ one.column_m[index]))
     return Unbound(*(_stacked(columns[is_pose], by_points.shape[0]) for is_pose in (False, True)))
 
 
-def pose_changes(job, wall):
-    """(k,) by how much the poses of set-ups, as `unbound` of the points has them, are off.
-
-    What the wall tells of its shared columns, brought back to x, y (m) and orientation (rad) of
-    each set-up, as far as the radii tell these well where offsets are as they were found: a way
-    that hardly moves any radius is known to decimetres only, and nothing hangs on it.
-    """
-    count = wall.points_read
-    unbound = unbound_of(job.points, wall.radii_by_points[:count], wall.accepted)
-    if not unbound.poses.shape[1] or wall.field.sites.shared is None:
-        return np.zeros(unbound.poses.shape[1])
-    free = unbound.offsets.shape[1]
-    values, covariance = wall.field.shared
-    covariance = covariance[:, -len(values) :]
-    across, own = covariance[free:, :free], covariance[:free, :free]
-    beside = covariance[free:, free:] - across @ np.linalg.pinv(own) @ across.T
-    variance, axes = np.linalg.eigh(beside)
-    known = axes[:, variance < SURE**2]
-    moved = wall.field.sites.shared[:count, free:] @ (known @ (known.T @ values[free:]))
-    units = [one.unit for one in job.points.unbound if one.what == "pose"]
-    return -_sizes(units) * np.linalg.lstsq(unbound.poses, moved, rcond=None)[0]
+def offsets_then_poses(points):
+    """What nothing binds of points, in the order of the columns that a field shares."""
+    return sorted(points.unbound, key=lambda one: one.what == "pose")
 
 
-def _sizes(units):
-    return np.array([MOVED_M if one == "m" else TURNED_RAD for one in units])
+def size_of(cause):
+    """How far off it may be, m or rad; of an offset the unit."""
+    if cause.what != "pose":
+        return 1.0
+    return MOVED_M if cause.unit == "m" else TURNED_RAD
 
 
 def _stacked(columns, count):

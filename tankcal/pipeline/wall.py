@@ -1,6 +1,7 @@
 """From surveyed points to the wall: told from clutter, its axis, covariance, field and sections."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import scipy.sparse
@@ -28,6 +29,7 @@ from tankcal.pipeline.survey_warnings import (
     weak_sections,
 )
 from tankcal.pipeline.surveyed_wall import Wall
+from tankcal.pipeline.told_unknowns import told_unknowns, with_spread
 from tankcal.pipeline.undecided_columns import undecided_halves
 from tankcal.pipeline.untied_setups import unbound_of
 from tankcal.pipeline.wall_readings import noise_by_inputs
@@ -44,7 +46,7 @@ from tankcal.sections import (
 from tankcal.solver.threads import threads_for
 
 
-def find_wall(job, progress, dof=np.inf, amplitudes=None):
+def find_wall(job, progress, dof=np.inf, amplitudes=None, *, sizes=None):
     """Separate the wall from clutter, and fit axis, field and sections to the points of a job.
 
     Parameters
@@ -56,6 +58,8 @@ def find_wall(job, progress, dof=np.inf, amplitudes=None):
         Degrees of freedom of the points' covariance, where it was given.
     amplitudes : Amplitudes, optional
         Of the wall's components, where they are known beforehand; None: they are estimated.
+    sizes : Amplitudes, optional
+        That the same readings have shown before; None: they are estimated from these points.
 
     Returns
     -------
@@ -89,10 +93,10 @@ def find_wall(job, progress, dof=np.inf, amplitudes=None):
                 count=np.count_nonzero(shell.on_wall),
             )
         )
-        return fit_wall(job, shell, dof, amplitudes=amplitudes)
+        return fit_wall(job, shell, dof, amplitudes=amplitudes, sizes=sizes)
 
 
-def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
+def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     """Fit field and sections to the points of a job that are known to be of its wall.
 
     Parameters
@@ -100,7 +104,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     job : Job
     shell : Shell
         Which points are of the wall, and its axis.
-    dof, amplitudes
+    dof, amplitudes, sizes
         As in `find_wall`.
 
     Returns
@@ -127,7 +131,8 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     radius = means @ np.concatenate([one.radius_m for one in samples]) - undecided.sum(axis=1)
     noise = (means @ scipy.sparse.block_diag(_blocks(samples)) @ means.T).toarray()
     is_known = amplitudes is not None
-    if not is_known:
+    amplitudes = amplitudes if is_known else sizes
+    if amplitudes is None:
         alone = sites.take(np.ones(len(sites), dtype=bool))  # without courses that have no point
         amplitudes = estimate_amplitudes(
             alone,
@@ -167,6 +172,10 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         by_points = _padded(by_points, more)
         by_inputs = {name: np.pad(one, (0, more)) for name, one in by_inputs.items()}
         undecided = np.pad(undecided, ((0, more), (0, 0)))
+    told = None
+    if job.points.unbound:
+        told = told_unknowns(job.points, unbound, field, (accepted, by_points, covariance))
+        sections = tuple(map(partial(with_spread, told), sections, to_fit))
     return Wall(
         shell=shell,
         joints_m=joints,
@@ -182,6 +191,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         by_inputs=by_inputs,
         without_inputs=("offset",) if job.hits or job.clouds else (),  # instruments have their own
         origins_m=np.array([one.centre_m for one in samples]),
+        told=told,
     )
 
 

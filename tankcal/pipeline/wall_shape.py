@@ -104,7 +104,7 @@ def wall_shape_of(job, wall):
     if not isinstance(wall, Wall) or job.radii is not None:
         return None
     levels = _levels(job, wall)
-    plumbed = [i for i, one in enumerate(levels) if _has_centre(wall, one)]
+    plumbed = [i for i, one in enumerate(levels) if one.ring >= 0]
     pairs = [(plumbed[0], one) for one in plumbed[1:]]
     of_courses = _pairs_of_courses(wall, levels, plumbed)
     base = ShapeBase(job, wall, levels, plumbed, (*pairs, *of_courses))
@@ -196,11 +196,6 @@ def _readings_of(sites, ring):
     even = np.arange(EVEN_AZIMUTHS) * FULL_TURN / EVEN_AZIMUTHS
     away = np.abs((np.sort(azimuth)[:, None] - even + np.pi) % FULL_TURN - np.pi)
     return own[np.unique(np.argmin(away, axis=0))]
-
-
-def _has_centre(wall, level):
-    plumbed = wall.field.plumbed
-    return level.ring >= 0 and (plumbed is None or level.ring < plumbed)
 
 
 def _pairs_of_courses(wall, levels, plumbed):

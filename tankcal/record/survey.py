@@ -10,7 +10,6 @@ from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall_straps import mean_radii
 from tankcal.record.columns import ArrayColumns, ArrayRows, plain_if_short
 from tankcal.record.schema import Finite, Saved, filled_from, key
-from tankcal.sections import coordinates_of
 
 EVEN = 720  # azimuths; they resolve products of an outline with the highest mode of the form
 
@@ -207,8 +206,7 @@ def _points_of_scan(result):
 
 
 def _covariance_of(result, member):
-    block = result.wall.covariance_m2[3 * member : 3 * member + 3][:, 3 * member : 3 * member + 3]
-    return block if isinstance(block, np.ndarray) else block.toarray()
+    return result.wall.spread_of(np.eye(3), [member])
 
 
 def rejected_of(result):
@@ -284,12 +282,10 @@ def _area_sd(result, section):
     azimuth, weight = outline.nodes()
     gradient = (outline.radius_m(azimuth) * weight) @ outline.basis(azimuth)
     by_points = (gradient @ outline.from_radii) @ section.radii_by_points
-    index = coordinates_of(section.group.members)
+    own = result.wall.spread_of(by_points[None], section.group.members)[0, 0]
     even = np.arange(EVEN) * FULL_TURN / EVEN
     form = outline.radius_m(even) @ outline.unseen_form_m(even) * FULL_TURN / EVEN
-    return np.sqrt(
-        by_points @ (result.wall.covariance_m2[index][:, index] @ by_points) + form @ form
-    )
+    return np.sqrt(own + form @ form)
 
 
 def courses_of(result):

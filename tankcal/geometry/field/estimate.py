@@ -154,6 +154,12 @@ class WallField:
         covariance = scipy.linalg.cho_solve(normal, np.eye(len(free))[:, -count:])
         return free[-count:], covariance[-count:]
 
+    @property
+    def shared_by_readings(self):
+        """(s, n) derivative of what courses share without a prior by the readings."""
+        _, by_columns, normal = self._factored
+        return scipy.linalg.cho_solve(normal, by_columns.T)[-self.sites.shared.shape[1] :]
+
     # what follows is computed once
 
     @cached_property
