@@ -7,14 +7,20 @@ covariance of the points by themselves, have after it was taken off them the cov
     C + D S D' - C B' G' D' - D G B C = C + D A' + A D',   A = D S / 2 - C B' G',
 
 S that of t: its errors are those of the points in part, and of what was not seen of the wall.
+
+A way to move set-ups that hardly moves any radius, as a turn about the axis of the tank, is told to
+decimetres only, and nothing hangs on it: these stay where they were put, and are no part of t.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg
 
 from tankcal.pipeline.untied_setups import offsets_then_poses, size_of
 from tankcal.sections import circle_by_coordinates, coordinates_of
+
+SURE = 0.1  # sd of a way, as a part of how far poses may be off: less is told well
 
 
 @dataclass(frozen=True)
@@ -29,6 +35,8 @@ class ToldUnknowns:
         The same of x and y (m) and orientation (rad) of each pose that the wall alone ties.
     largest_m : float
         By how much that moves an accepted point at most.
+    by_readings : ndarray, shape (s, n)
+        G: derivative of what was told by the readings of the wall.
     moved_m : ndarray, shape (3m, s)
         D: derivative of the accepted points by what was told.
     with_points_m2 : ndarray, shape (3m, s)
@@ -38,6 +46,7 @@ class ToldUnknowns:
     offsets_m: dict
     poses: np.ndarray
     largest_m: float
+    by_readings: np.ndarray
     moved_m: np.ndarray
     with_points_m2: np.ndarray
 
@@ -65,19 +74,38 @@ def told_unknowns(points, unbound, field, parts):
     """
     accepted, by_points, covariance = parts
     shared, index = offsets_then_poses(points), coordinates_of(accepted)
-    ways = np.array([size_of(one) for one in shared])[:, None] * unbound.ways_of(field.sites)
+    sizes, count = np.array([size_of(one) for one in shared]), unbound.offsets.shape[1]
+    ways = sizes[:, None] * unbound.ways_of(field.sites)
     mine = slice(0, ways.shape[1])  # those of lines come after them
-    told, spread = field.shared
+    values, spread = field.shared
+    sure = _surely_told(spread[mine, mine], count)
+    ways, spread = ways @ sure, sure.T @ spread[mine, mine] @ sure
+    by_readings, values = sure.T @ field.shared_by_readings[mine], sure.T @ values[mine]
     moved = np.column_stack([one.column_m[index] for one in shared]) @ ways
-    own = covariance @ (by_points.T @ field.shared_by_readings[mine].T)
-    values, count = -(ways @ told[mine]), unbound.offsets.shape[1]
+    off = -(ways @ values)
     return ToldUnknowns(
-        offsets_m={one.name: float(values[i]) for i, one in enumerate(shared[:count])},
-        poses=values[count:].reshape(-1, 3),
-        largest_m=float(np.abs(moved @ told[mine]).max(initial=0.0)),
+        offsets_m={one.name: float(off[i]) for i, one in enumerate(shared[:count])},
+        poses=off[count:].reshape(-1, 3),
+        largest_m=float(np.abs(moved @ values).max(initial=0.0)),
+        by_readings=by_readings,
         moved_m=moved,
-        with_points_m2=moved @ spread[mine, mine] / 2 - own,
+        with_points_m2=moved @ spread / 2 - covariance @ (by_points.T @ by_readings.T),
     )
+
+
+def _surely_told(spread, count):
+    """(s, q) offsets, and directions of the ways of poses that are told well.
+
+    Where offsets are as they were found: the two may well hang together.
+
+    spread  (s, s) covariance of what was told
+    count   of offsets, the first of it
+    """
+    across, own = spread[count:, :count], spread[:count, :count]
+    variances, axes = np.linalg.eigh(
+        spread[count:, count:] - across @ np.linalg.pinv(own) @ across.T
+    )
+    return scipy.linalg.block_diag(np.eye(count), axes[:, variances < SURE**2])
 
 
 def with_spread(told, section, fitted):
