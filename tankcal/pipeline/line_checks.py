@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from scipy.special import ndtri
 
 from tankcal.errors import Problem
 from tankcal.messages import message
@@ -22,6 +23,8 @@ UNLIKE_SDS = 3.0  # of a collimation, from what its certificate says
 OFF_AXIS_M, OFF_AXIS_SDS = 0.01, 6.0  # of a level's centre, from the straight axis
 OFF_LEVEL_M = 0.003  # of a strap's radius, from the levels of its course
 SCALE_OF_MEDIAN = 1.4826
+BY_CHANCE = 0.01  # of sound surveys whose lines seem to have moved by their readings' scatter
+WRITTEN_M = 5e-5  # half the last digit that is said of a difference
 CRITICAL_LEAN = 3.72  # of two slopes together: a chi-square of two exceeds it in 0.1 %
 VERTICALS = 1e-4  # m/m: how alike the verticals of a plummet and of the points are, 20"
 MANY, MANY_LINES = 0.15, 0.5  # of the offsets, and of the lines with one of them, set aside
@@ -193,17 +196,21 @@ def _set_aside(job, wall):
 
 def _moved(job):
     """Lines whose readings at the reference level differ: the instrument was moved between."""
-    limit, seen = limits_of(RULES)["reference_repeats_mm"] / 1000, {}
+    seen = {}
     for one in job.lines.offsets:
         if one.reference:
             seen.setdefault((one.line, one.face), []).append(one)
+    again = max(sum(len(one) - 1 for one in seen.values()), 1)
+    factor = np.sqrt(2) * -ndtri(BY_CHANCE / 2 / again)
     for (line, _), several in seen.items():
         found = [one.offset_m for one in several]
+        limit = limits_of(RULES)["reference_repeats_mm"] / 1000
+        limit = max(limit, factor * max(one.sd_m for one in several)) + WRITTEN_M
         if max(found) - min(found) > limit:
             text = message(
                 "line_moved",
                 "the readings of line {line!r} at the reference level differ by {apart_mm:.1f} mm;"
-                " expected at most {limit_mm:g} mm: did the instrument move?",
+                " expected at most {limit_mm:.1f} mm: did the instrument move?",
                 line=line,
                 apart_mm=1000 * (max(found) - min(found)),
                 limit_mm=1000 * limit,
