@@ -13,9 +13,11 @@ whether one that might be negative is counted from the end.
 
 import numpy as np
 
-PANEL = 64  # columns of Y whose products with those after them are taken at once
+PANEL = 32  # columns of Y whose products with those after them are taken at once
 COMPILED = (
     "_is_alike",
+    "_square",
+    "_product",
     "_add_squares",
     "_add_blocks",
     "_root",
@@ -39,31 +41,30 @@ def _add_squares(w, jac, skip, first, cuts, t, g):
     Neighbouring rows with the same columns enter by one product.
     """
     n, m, width = jac.shape
-    runs = len(cuts) - 1
-    flat, errors = jac.reshape((n * m, width)), w.reshape(n * m)
-    square, product = np.empty((width, width)), np.empty(width)
-    end = 0
+    k, runs = width - skip, len(cuts) - 1
+    flat, errors = jac.reshape(jac.size), w.reshape(w.size)
+    square, product = np.empty((k + 1) * k), np.empty(k)
+    end = n if runs == 0 else 0
     while end < n:
         begin, end = end, end + 1
         while end < n and _is_alike(first, end, begin):
             end += 1
-        f = flat[m * begin : m * end]
-        np.dot(f.T, f, square)
-        np.dot(f.T, errors[m * begin : m * end], product)
+        _square(flat, m * begin * width + skip, width, m * (end - begin), 0, k, k, square)
+        _product(flat, m * begin * width + skip, width, errors[m * begin : m * end], product)
         for one in range(runs):
             to = first[begin, one] - cuts[one]
             for a in range(cuts[one], cuts[one + 1]):
-                g[to + a] += product[skip + a]
+                g[to + a] += product[a]
             for other in range(one, runs):
                 by = first[begin, other] - cuts[other]
                 if by + cuts[other] >= to + cuts[one]:
                     for a in range(cuts[one], cuts[one + 1]):
                         for q in range(max(a, cuts[other]), cuts[other + 1]):
-                            t[to + a, by + q] += square[skip + a, skip + q]
+                            t[to + a, by + q] += square[a * k + q]
                 else:
                     for q in range(cuts[other], cuts[other + 1]):
                         for a in range(cuts[one], cuts[one + 1]):
-                            t[by + q, to + a] += square[skip + q, skip + a]
+                            t[by + q, to + a] += square[a * k + q]
 
 
 def _is_alike(first, i, j):
@@ -71,6 +72,48 @@ def _is_alike(first, i, j):
     for run in range(first.shape[1]):
         alike = alike and first[i, run] == first[j, run]
     return alike
+
+
+def _square(flat, first, width, rows, low, high, n, out):
+    """Y'Y, the upper half of its rows from low to high, into out, n numbers a row and a row more.
+
+    The n numbers of a row of Y begin at first, those of the next after width. Six rows by two
+    columns at a time: what is read is used often, and still fits into the registers.
+    """
+    step, k, last = np.uintp(width), np.uintp(n), np.uintp(high - 1)
+    for i in range(np.uintp(low * n), np.uintp(high * n)):
+        out[i - np.uintp(low * n)] = 0.0
+    for row in range(0, rows, 6):
+        h1, h2, h3 = rows > row + 1, rows > row + 2, rows > row + 3
+        h4, h5 = rows > row + 4, rows > row + 5  # False: no row there, the last one counts once
+        y0 = np.uintp(first + row * width)
+        y1 = y0 + step * np.uintp(h1)
+        y2 = y1 + step * np.uintp(h2)
+        y3 = y2 + step * np.uintp(h3)
+        y4 = y3 + step * np.uintp(h4)
+        y5 = y4 + step * np.uintp(h5)
+        for a in range(np.uintp(low), np.uintp(high), np.uintp(2)):
+            b = min(a + np.uintp(1), last)
+            to = (a - np.uintp(low)) * k
+            below = to + k
+            a0, a1, a2 = flat[y0 + a], h1 * flat[y1 + a], h2 * flat[y2 + a]
+            a3, a4, a5 = h3 * flat[y3 + a], h4 * flat[y4 + a], h5 * flat[y5 + a]
+            b0, b1, b2 = flat[y0 + b], h1 * flat[y1 + b], h2 * flat[y2 + b]
+            b3, b4, b5 = h3 * flat[y3 + b], h4 * flat[y4 + b], h5 * flat[y5 + b]
+            for q in range(a, k):
+                q0, q1, q2 = flat[y0 + q], flat[y1 + q], flat[y2 + q]
+                q3, q4, q5 = flat[y3 + q], flat[y4 + q], flat[y5 + q]
+                out[to + q] += a0 * q0 + a1 * q1 + a2 * q2 + a3 * q3 + a4 * q4 + a5 * q5
+                out[below + q] += b0 * q0 + b1 * q1 + b2 * q2 + b3 * q3 + b4 * q4 + b5 * q5
+
+
+def _product(flat, first, width, errors, out):
+    """F'e into out, of rows F that begin at first, those of the next after width."""
+    out[:] = 0.0
+    for row in range(len(errors)):
+        at, error = np.uintp(first + row * width), errors[row]
+        for a in range(np.uintp(len(out))):
+            out[a] += flat[at + a] * error
 
 
 def _add_blocks(w, jac, block, place, cuts, starts, v, wide, b):
@@ -144,41 +187,25 @@ def _forward_all(v, b, o, wide, first, n, right):
         right[a] += y0 * b0 + y1 * b1 + y2 * b2
 
 
-def _leave(t, columns, runs, first, y, store):
-    """Take Y'Y, its upper half, from the places of its columns in t; y (3 blocks, n).
+def _leave(t, columns, runs, first, wide, rows, square):
+    """Take Y'Y, its upper half, from the places of its columns in t; Y (rows, n) from 3 first on.
 
     Of many columns PANEL at a time are multiplied by themselves and those after them.
     """
-    rows, n = y.shape
-    width, one = t.shape[1], 0
-    flat = t.reshape(t.size)
+    n, one = len(columns), 0
+    width, flat = t.shape[1], t.reshape(t.size)
     for low in range(0, n, PANEL):
         high = min(low + PANEL, n)
-        if n <= PANEL:
-            part = store[: n * n]
-            np.dot(y.T, y, part.reshape((n, n)))
-        else:
-            wide, tall = (high - low) * (n - low), (high - low) * rows
-            part = store[:wide]
-            left = store[wide : wide + tall].reshape((rows, high - low))
-            right = store[wide + tall : wide + tall + rows * (n - low)].reshape((rows, n - low))
-            for i in range(rows):
-                for a in range(low, high):
-                    left[i, a - low] = y[i, a]
-                for a in range(low, n):
-                    right[i, a - low] = y[i, a]
-            np.dot(left.T, right, part.reshape((high - low, n - low)))
+        _square(wide, 3 * first, n, rows, low, high, n, square)
         for a in range(low, high):
             if runs[one + 1] - first == a:
                 one += 1
-            line = columns[a] * width
-            of = np.uintp((a - low) * (n - low))
+            line, of = columns[a] * width, (a - low) * n
             for other in range(one, len(runs) - 1):
                 begin = max(a, runs[other] - first)
-                to = np.uintp(line + columns[begin])
-                at = of + np.uintp(begin - low)
+                to, at = np.uintp(line + columns[begin]), np.uintp(of + begin)
                 for q in range(np.uintp(runs[other + 1] - first - begin)):
-                    flat[to + q] -= part[at + q]
+                    flat[to + q] -= square[at + q]
 
 
 def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, smallest):
@@ -186,22 +213,19 @@ def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, sm
 
     Blocks alike[k] to alike[k + 1] have the same columns: they leave t together.
     """
-    longest, most = _sizes(starts, alike)
-    store, square = np.empty(longest), np.empty((longest + 6 * most) * longest)
+    longest, _ = _sizes(starts, alike)
+    right, square = np.empty(longest), np.empty((PANEL + 1) * longest)
     for k in range(len(alike) - 1):
         begin, end, first = alike[k], alike[k + 1], starts[alike[k]]
         n = starts[begin + 1] - first
-        y = wide[3 * first : 3 * starts[end]].reshape((3 * (end - begin), n))
-        right = store[:n]
-        right[:] = 0.0
+        right[:n] = 0.0
         for o in range(begin, end):
             if not _root(v[o], damping, smallest):
                 return o
             _forward(v[o], b[o])
             _forward_all(v, b, o, wide, 3 * starts[o], n, right)
-        _leave(
-            t, columns[first : first + n], ends[runs[begin] : runs[begin + 1] + 1], first, y, square
-        )
+        edges = ends[runs[begin] : runs[begin + 1] + 1]
+        _leave(t, columns[first : first + n], edges, first, wide, 3 * (end - begin), square)
         for a in range(n):
             g[columns[first + a]] -= right[a]
     return -1

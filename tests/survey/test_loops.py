@@ -1,5 +1,6 @@
 """The loops that are compiled, run as they are written, against whole arrays: a second method."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -112,6 +113,35 @@ def test_blocks_eliminated_together_give_what_they_give_one_by_one(monkeypatch):
     assert joined < alone
     for one, other in zip(of_joined, of_single, strict=True):
         assert one == pytest.approx(other, abs=1e-11)
+
+
+@pytest.mark.parametrize("m", [1, 2, 3, 7])
+def test_rows_added_by_loops_are_those_of_arrays(m, monkeypatch):
+    """Neighbours with the same columns, in series of one row and of many; runs in any order."""
+    rng, reduced, blocks = np.random.default_rng(23), 15, 12
+    groups = groups_of(rng, reduced, blocks)
+    alike = np.repeat([[0, 1, 2, 3, 9], [4, 5, 6, 7, -1], [9, 10, 11, 2, 0]], 5, axis=0)
+    groups = [replace(one, rows=m) for one in (*groups, Group(alike.astype(np.int32), m, None))]
+    plan = model.plan(reduced, blocks, groups)
+    rows = [rng.normal(size=(len(one.columns), m, one.columns.shape[1] + 1)) for one in groups]
+
+    def added():
+        normals = Normals.zero(plan)
+        for batch in plan.batches:
+            both = rows[batch.group]
+            w, jac = both[:, :, -1], np.ascontiguousarray(both[:, :, :-1])
+            elimination.add_rows(plan, batch, batch.of(w), batch.of(jac), normals)
+        normals.t[:-1, :-1] += np.tril(normals.t[:-1, :-1], -1).T  # arrays do so when eliminating
+        upper = np.triu(normals.t[:-1, :-1])
+        return upper, normals.g[:-1], normals.v, normals.b, normals.wide[:-1]
+
+    of_arrays = added()
+    monkeypatch.setattr(elimination, "is_worth_compiling", lambda rows=0: True)
+    plain = SimpleNamespace(**{name: vars(loops)[name] for name in loops.COMPILED})
+    monkeypatch.setattr(elimination, "compile_functions", lambda module, names: plain)
+    of_loops = added()
+    for one, other in zip(of_loops, of_arrays, strict=True):
+        assert one == pytest.approx(other, abs=1e-12)
 
 
 @pytest.mark.parametrize("panel", [4, loops.PANEL])
