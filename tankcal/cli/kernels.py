@@ -30,6 +30,7 @@ def main():
     adjusted = adjust(small_survey())
     adjusted.residuals  # noqa: B018 (what it computes needs loops of its own)
     adjusted.point_covariances_m2  # noqa: B018
+    adjusted.covariance_m2()
     height_m = np.linspace(0.0, 10.0, ROWS)
     volume_m3 = 100.0 * height_m + np.sin(height_m)
     best_breakpoints(height_m, volume_m3, 10)

@@ -7,7 +7,15 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
-from tankcal.solver.elimination import block_cofactors, block_rows, leverage, roots
+from tankcal.solver.elimination import (
+    add_own_cofactors,
+    block_cofactors,
+    block_rows,
+    inverse_roots,
+    leverage,
+    roots,
+    through_reduced,
+)
 from tankcal.solver.threads import threads_for
 
 DENSE = 4e6  # numbers
@@ -50,14 +58,12 @@ class Factor:
 
     def whitened(self, columns):
         """L^-1 D columns, so that columns' S^-1 columns is a sum of squares; columns (nr, k)."""
-        scaled = columns * self.scale[:, None]
+        scaled = np.multiply(columns, self.scale[:, None], order="F")
         if self.tangent is not None:
             scaled = self.tangent.in_null_space(scaled)
         if not scaled.size:
             return scaled
-        right, lower, transposed = 1, 1, 1
-        blas = scipy.linalg.blas
-        return blas.dtrsm(1.0, self.lower, scaled.T, right, lower, transposed, overwrite_b=1).T
+        return scipy.linalg.blas.dtrsm(1.0, self.lower, scaled, lower=1, overwrite_b=1)
 
     def solved(self, columns):
         """S^-1 columns, columns (nr,) or (nr, k)."""
@@ -124,13 +130,10 @@ class Cofactors:
             return self._cofactors(np.asarray(columns))
 
     def _cofactors(self, columns):
-        nr = self.plan.reduced
-        whitened = self.factor.whitened(self._through_reduced(columns))
+        normals = self.factor.normals
+        whitened = self.factor.whitened(through_reduced(self.plan, normals, columns))
         q = whitened.T @ whitened
-        eliminated = np.flatnonzero(columns >= nr)
-        if len(eliminated):
-            block, axis = np.divmod(columns[eliminated] - nr, 3)
-            self._add_own(q, eliminated, block, axis)
+        add_own_cofactors(self.plan, normals, columns, q)
         return q if self.datum is None else self._in_datum(q, columns, columns)
 
     @cached_property
@@ -190,47 +193,10 @@ class Cofactors:
             shape=(3 * blocks, 3 * blocks),
         )
 
-    def _through_reduced(self, columns):
-        """How each unknown follows the reduced ones: (nr, k), d unknown / d reduced."""
-        nr, starts, wide = self.plan.reduced, self.plan.starts, self.factor.normals.wide
-        out = np.zeros((nr, len(columns)))
-        own = np.flatnonzero(columns < nr)
-        out[columns[own], own] = 1.0
-        eliminated = np.flatnonzero(columns >= nr)
-        block, axis = np.divmod(columns[eliminated] - nr, 3)
-        first, count = starts[block], np.diff(starts)[block]
-        entry = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
-        length, place = np.repeat(count, count), np.repeat(2 * first, count) + entry
-        change = np.zeros(len(entry))
-        for root in self.inverse_roots[block, :, axis].T:  # one for each row of the wide part
-            change -= np.repeat(root, count) * wide[place]
-            place += length
-        to = self.plan.columns[entry] * np.int64(len(columns)) + np.repeat(eliminated, count)
-        out.reshape(-1)[to] = change
-        return out
-
     @cached_property
     def inverse_roots(self):
         """L^-1 (nb, 3, 3) of each block."""
-        a, b, c, d, e, f = self.factor.normals.v.T
-        inverse = np.zeros((self.plan.blocks, 3, 3))
-        inverse[:, 0, 0], inverse[:, 1, 1], inverse[:, 2, 2] = 1 / a, 1 / c, 1 / f
-        inverse[:, 1, 0], inverse[:, 2, 1] = -b / (a * c), -e / (c * f)
-        inverse[:, 2, 0] = (b * e / c - d) / (a * f)
-        return inverse
-
-    def _add_own(self, q, places, block, axis):
-        """Add V^-1 between the unknowns at `places` that belong to one block."""
-        inverse = self.inverse_roots.transpose(0, 2, 1) @ self.inverse_roots
-        order = np.argsort(block, kind="stable")
-        for shift in range(3):  # pairs that lie 0, 1 or 2 apart once sorted by block
-            i, j = order[: len(order) - shift], order[shift:]
-            same = block[i] == block[j]
-            i, j = i[same], j[same]
-            value = inverse[block[i], axis[i], axis[j]]
-            q[places[i], places[j]] += value
-            if shift:
-                q[places[j], places[i]] += value
+        return inverse_roots(self.factor.normals)
 
     def redundancy(self):
         """Redundancy numbers, a list of (n, m): the part of each error that its residual shows."""

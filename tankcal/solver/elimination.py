@@ -95,6 +95,60 @@ def roots(normals):
     return v
 
 
+def inverse_roots(normals):
+    """L^-1 (nb, 3, 3) of eliminated blocks."""
+    a, b, c, d, e, f = normals.v.T
+    inverse = np.zeros((len(normals.v), 3, 3))
+    inverse[:, 0, 0], inverse[:, 1, 1], inverse[:, 2, 2] = 1 / a, 1 / c, 1 / f
+    inverse[:, 1, 0], inverse[:, 2, 1] = -b / (a * c), -e / (c * f)
+    inverse[:, 2, 0] = (b * e / c - d) / (a * f)
+    return inverse
+
+
+def through_reduced(plan, normals, unknowns):
+    """How each of some unknowns (k,) follows the reduced ones: (nr, k), d unknown / d reduced."""
+    nr = plan.reduced
+    out = np.zeros((len(unknowns), nr))
+    if is_worth_compiling(plan.rows):
+        compile_functions(loops, loops.COMPILED)._through(
+            normals.v, normals.wide, plan.starts, plan.columns, unknowns, nr, out
+        )
+        return out.T
+    own, eliminated = np.flatnonzero(unknowns < nr), np.flatnonzero(unknowns >= nr)
+    out[own, unknowns[own]] = 1.0
+    block, axis = np.divmod(unknowns[eliminated] - nr, 3)
+    first, count = plan.starts[block], np.diff(plan.starts)[block]
+    entry = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
+    length, place = np.repeat(count, count), np.repeat(2 * first, count) + entry
+    change = np.zeros(len(entry))
+    for root in inverse_roots(normals)[block, :, axis].T:  # one for each row of the wide part
+        change -= np.repeat(root, count) * normals.wide[place]
+        place += length
+    out[np.repeat(eliminated, count), plan.columns[entry]] = change
+    return out.T
+
+
+def add_own_cofactors(plan, normals, unknowns, q):
+    """Add V^-1 between those of some unknowns (k,) that belong to one block to q (k, k)."""
+    places = np.flatnonzero(unknowns >= plan.reduced)
+    block, axis = np.divmod(unknowns[places] - plan.reduced, 3)
+    order = np.argsort(block, kind="stable")
+    block, axis, places = block[order], axis[order], places[order]
+    if is_worth_compiling(plan.rows):
+        run = compile_functions(loops, loops.COMPILED)
+        run._add_own(normals.v, block, axis, places, q)
+        return
+    root = inverse_roots(normals)
+    inverse = root.transpose(0, 2, 1) @ root
+    for shift in range(3):  # pairs that lie 0, 1 or 2 apart once sorted by block
+        i = np.flatnonzero(block[shift:] == block[: len(block) - shift])
+        j = i + shift
+        value = inverse[block[i], axis[i], axis[j]]
+        q[places[i], places[j]] += value
+        if shift:
+            q[places[j], places[i]] += value
+
+
 def block_cofactors(plan, normals, inverse):
     """Cofactors (nb, 3, 3) of all blocks, and (t, 3) of each block with its reduced columns.
 

@@ -28,6 +28,8 @@ COMPILED = (
     "_eliminate",
     "_back",
     "_inverse_root",
+    "_through",
+    "_add_own",
     "_among",
     "_own_cofactors",
     "_cofactors",
@@ -267,6 +269,39 @@ def _inverse_root(v, root):
     root[0, 0], root[1, 1], root[2, 2] = 1.0 / v[0], 1.0 / v[2], 1.0 / v[5]
     root[1, 0], root[2, 1] = -v[1] * root[0, 0] * root[1, 1], -v[4] * root[1, 1] * root[2, 2]
     root[2, 0] = -(v[3] * root[0, 0] + v[4] * root[1, 0]) * root[2, 2]
+
+
+def _through(v, wide, starts, columns, unknowns, reduced, out):
+    """d unknown / d reduced of some unknowns (k,) into out (k, nr), which is zero before."""
+    root = np.zeros((3, 3))
+    for i in range(len(unknowns)):
+        if unknowns[i] < reduced:
+            out[i, unknowns[i]] = 1.0
+            continue
+        o, axis = divmod(unknowns[i] - reduced, 3)
+        _inverse_root(v[o], root)
+        r0, r1, r2 = root[0, axis], root[1, axis], root[2, axis]
+        first, n = starts[o], starts[o + 1] - starts[o]
+        for a in range(n):
+            at = 3 * first + a
+            change = r0 * wide[at] + r1 * wide[at + n] + r2 * wide[at + 2 * n]
+            out[i, columns[first + a]] = -change
+
+
+def _add_own(v, block, axis, places, q):
+    """Add V^-1 between unknowns (k,), sorted by block, to their places in q."""
+    root = np.zeros((3, 3))
+    for i in range(len(block)):
+        _inverse_root(v[block[i]], root)
+        j = i
+        while j < len(block) and block[j] == block[i]:
+            value = 0.0
+            for e in range(3):
+                value += root[e, axis[i]] * root[e, axis[j]]
+            q[places[i], places[j]] += value
+            if j > i:
+                q[places[j], places[i]] += value
+            j += 1
 
 
 def _among(inverse, columns, runs, first, q):

@@ -288,15 +288,16 @@ def _cuts(columns, spare):
     n, k = columns.shape
     if k == 0 or n == 0:
         return np.arange(k + 1)
-    follows = np.ones(k - 1, dtype=bool)
+    begins = np.zeros(k + 1, dtype=bool)
+    begins[0] = begins[k] = True
     if is_worth_compiling(n):
         run = compile_functions(series, series.COMPILED)
-        run._follow(np.ascontiguousarray(columns), spare, follows)
+        run._find_breaks(np.ascontiguousarray(columns), spare, begins)
     else:
         for start in range(0, n, AT_ONCE):
             part = columns[start : start + AT_ONCE]
-            follows &= ((np.diff(part, axis=1) == 1) & (part[:, 1:] != spare)).all(axis=0)
-    return np.append(np.flatnonzero(np.append(True, ~follows)), k)
+            begins[1:k] |= ((np.diff(part, axis=1) != 1) | (part[:, 1:] == spare)).any(axis=0)
+    return begins.nonzero()[0]
 
 
 def _split(columns, reduced, blocks):

@@ -9,7 +9,7 @@ import numpy as np
 TOGETHER = 32  # blocks with the same columns that are eliminated at once, or fewer
 LEAVING = 4  # blocks whose products take as long as spreading those of a series over the columns
 COMPILED = (
-    "_follow",
+    "_find_breaks",
     "_mark",
     "_list_series",
     "_join_series",
@@ -26,12 +26,13 @@ def _mark(block, first, cuts, together):
                 together[block[i], first[i, run] + step] = True
 
 
-def _follow(columns, spare, follows):
-    """follows (k - 1,) stays True where in all rows (n, k) a column is the one after its left."""
-    for i in range(len(columns)):
-        for a in range(len(follows)):
-            right = columns[i, a + 1]
-            follows[a] &= (right == columns[i, a] + 1) & (right != spare)
+def _find_breaks(columns, spare, begins):
+    """begins (k + 1,) turns True where in some row (n, k) a column is not the one after its left."""
+    n, k = columns.shape
+    for i in range(n):
+        for a in range(1, k):
+            right = columns[i, a]
+            begins[a] |= (right != columns[i, a - 1] + 1) | (right == spare)
 
 
 def _list_series(together):

@@ -144,6 +144,13 @@ def test_rows_added_by_loops_are_those_of_arrays(m, monkeypatch):
         assert one == pytest.approx(other, abs=1e-12)
 
 
+def among(plan, normals, unknowns):
+    """How unknowns follow the reduced ones, and what their blocks add to their cofactors."""
+    own = np.zeros((len(unknowns), len(unknowns)))
+    elimination.add_own_cofactors(plan, normals, unknowns, own)
+    return elimination.through_reduced(plan, normals, unknowns), own
+
+
 @pytest.mark.parametrize("panel", [4, loops.PANEL])
 def test_elimination_by_loops_is_that_of_arrays(panel, monkeypatch):
     rng, reduced, blocks = np.random.default_rng(7), 15, 12
@@ -161,6 +168,8 @@ def test_elimination_by_loops_is_that_of_arrays(panel, monkeypatch):
     blocks_of_arrays = elimination.back_substitute(plan, first, step)
     inverse = np.cov(rng.normal(size=(reduced, 2 * reduced)))
     of_arrays = elimination.block_cofactors(plan, first, inverse)
+    some = rng.permutation(reduced + 3 * blocks)[:-5]
+    among_of_arrays = among(plan, first, some)
     monkeypatch.setattr(loops, "PANEL", panel)
     monkeypatch.setattr(elimination, "is_worth_compiling", lambda rows=0: True)
     plain = SimpleNamespace(**{name: vars(loops)[name] for name in loops.COMPILED})
@@ -168,6 +177,8 @@ def test_elimination_by_loops_is_that_of_arrays(panel, monkeypatch):
     assert elimination.eliminate(plan, second, 1e-3, 1e-12) == -1
     for name in vars(first):
         assert getattr(second, name) == pytest.approx(getattr(first, name), abs=1e-12), name
+    for one, other in zip(among(plan, second, some), among_of_arrays, strict=True):
+        assert one == pytest.approx(other, abs=1e-11)
     found = elimination.back_substitute(plan, second, step)
     assert found == pytest.approx(blocks_of_arrays, abs=1e-12)
     for one, other in zip(

@@ -61,7 +61,7 @@ def layout_of(survey, eliminated, used, interior_free, table):
     reduced = next_column
     last = np.flatnonzero(eliminated)
     if survey.image_points is not None:  # points in the same photos, or nearly, next to one another
-        mark = np.geomspace(1.0, 1e-12, len(free_photos))
+        mark = 10.0 ** (-12 * np.arange(len(free_photos)) / max(len(free_photos) - 1, 1))
         seen = np.bincount(
             survey.image_points.point, weights=mark[survey.image_points.photo], minlength=points
         )

@@ -146,6 +146,8 @@ class Observations:
     def exact(self):
         """(n,) True for those that hold exactly: sd 0; SolutionError when only a part of one."""
         zero = np.reshape(self.sd, (len(self), self.rows)) == 0
+        if not zero.any():
+            return np.zeros(len(self), dtype=bool)
         exact = zero.all(axis=1)
         if (zero.any(axis=1) & ~exact).any():
             raise SolutionError(
@@ -203,10 +205,12 @@ class Observations:
         return self._each(state.nuisance, 0.0)
 
     def _each(self, of_all, none):
-        return [
-            np.append(of_all.get(of, np.zeros(0, dtype=int)), none)[getattr(self, number)]
-            for of, number in self.nuisances
-        ]
+        found = []
+        for of, number in self.nuisances:
+            values = of_all.get(of, ())
+            there = np.append(values, none) if len(values) else np.array([none])
+            found.append(there[getattr(self, number)])
+        return found
 
     def computed(self, state, derivatives):
         """Computed values (n, m) and, if asked for, derivatives (n, m, K)."""

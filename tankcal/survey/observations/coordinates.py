@@ -7,6 +7,8 @@ import numpy as np
 from tankcal.survey.observations.base import Observations
 from tankcal.survey.observations.nuisance import NUISANCES
 
+_UNITS = np.eye(3)  # derivatives of a coordinate by x, y, z
+
 
 @dataclass(frozen=True)
 class ControlCoordinates(Observations):
@@ -27,7 +29,7 @@ class ControlCoordinates(Observations):
     def computed(self, state, derivatives):
         """The coordinates (n, 1)."""
         computed = state.xyz_m[self.point, self.axis, None]
-        return computed, np.eye(3)[self.axis][:, None, :] if derivatives else None
+        return computed, _UNITS[self.axis, None] if derivatives else None
 
     def relative(self, centre):
         """Coordinates relative to a centre (3,)."""

@@ -86,7 +86,7 @@ class Distances(Sights):
         d = self.line(state)
         if self.horizontal:
             d[2] = 0.0
-        s = np.sqrt(np.sum(d * d, axis=0))
+        s = np.sqrt(np.einsum("kn,kn->n", d, d))
         scale, offset = self.nuisance(state)
         m = 1.0 + scale
         computed = (m * s + offset)[:, None]
