@@ -27,7 +27,7 @@ def _mark(block, first, cuts, together):
 
 
 def _find_breaks(columns, spare, begins):
-    """begins (k + 1,) turns True where in some row (n, k) a column is not the one after its left."""
+    """begins (k + 1,) turns True where a column of a row (n, k) is not the one after its left."""
     n, k = columns.shape
     for i in range(n):
         for a in range(1, k):

@@ -80,7 +80,7 @@ class Problem:
     @property
     def aside(self):
         """(points,) True for those that do not take part."""
-        return np.array([bool(why) for why in self.set_aside], dtype=bool)
+        return _are_told(self.set_aside)
 
     def name_of_point(self, point):
         """Name of a point."""
@@ -94,7 +94,7 @@ class Problem:
 def assemble(survey):
     """The Problem of a Survey; raises SolutionError when something cannot be determined."""
     set_aside = _set_aside(survey)
-    used = np.array([not why for why in set_aside], dtype=bool)
+    used = ~_are_told(set_aside)
     centre = _centre(survey)
     table, values, interior_free, known = _interior(survey)
     groups, sources, rows_of, exact = _others(survey, used, centre)
@@ -178,6 +178,13 @@ def _set_aside(survey):
     return tuple(_poor(name, count) if is_bad else "" for name, count, is_bad in names)
 
 
+def _are_told(texts):
+    """(n,) True where a text is not empty."""
+    if not any(texts):  # of many points, in no time
+        return np.zeros(len(texts), dtype=bool)
+    return np.array([bool(text) for text in texts])
+
+
 def _poor(name, rays):
     if rays == 1:
         return one_ray_sentence(name)
@@ -239,9 +246,9 @@ def _others(survey, used, centre):
 
 def _centre(survey):
     """Middle of the start coordinates: where the adjustment puts its origin."""
-    known = np.isfinite(survey.xyz_m).all(axis=1)
+    known = np.isfinite(survey.xyz_m)
     if not known.all():
-        missing = [survey.points[i] for i in np.flatnonzero(~known)[:5]]
+        missing = [survey.points[i] for i in np.flatnonzero(~known.all(axis=1))[:5]]
         raise SolutionError(
             message(
                 "no_approximate_coordinates",

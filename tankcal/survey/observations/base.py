@@ -176,9 +176,12 @@ class Observations:
         return np.zeros(len(self), dtype=bool)
 
     def taken(self, keep):
-        """The observations `keep` (indices or a mask)."""
+        """The observations `keep` (indices, a mask or a slice)."""
+        if not isinstance(keep, slice):
+            keep = np.asarray(keep)
+            keep = keep.nonzero()[0] if keep.dtype == bool else keep
         parts = {
-            name: value[keep]
+            name: value[keep] if isinstance(keep, slice) else value.take(keep, axis=0)
             for name, value in vars(self).items()
             if isinstance(value, np.ndarray)
             and name in self.__dataclass_fields__

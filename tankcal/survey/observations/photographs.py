@@ -65,8 +65,8 @@ class ImageCoordinates(Observations):
         interior = layout.interior[self.interior_of[:, self.active]]
         of_photo = np.hstack([layout.photos, interior]).astype(np.int32)
         found = np.empty((len(self), 3 + of_photo.shape[1]), dtype=np.int32)
-        found[:, :3] = layout.points[self.point]
-        found[:, 3:] = of_photo[self.photo]
+        found[:, :3] = layout.points.take(self.point, axis=0)
+        found[:, 3:] = of_photo.take(self.photo, axis=0)
         return found
 
     def computed(self, state, derivatives):
