@@ -126,8 +126,8 @@ class Normals:
         )
 
     def clear(self):
-        """Start again without asking for memory."""
-        for array in (self.v, self.b, self.wide, self.t, self.g):
+        """Start again without asking for memory; of the wide part the spare number alone."""
+        for array in (self.v, self.b, self.t, self.g, self.wide[-1:]):
             array.fill(0.0)
 
 

@@ -22,12 +22,14 @@ class Part:
 
     fill     see Group, of these alone       batches  their Batches, rows counted within the part
     w, jac   (n, m) and (n, m, K), filled; the jac of a part is that of others of its group, too
+    reach    numbers of the wide part up to the last that these rows or those before them meet
     """
 
     fill: object
     batches: tuple
     w: np.ndarray
     jac: np.ndarray
+    reach: int = 0
 
 
 class Rows:
@@ -44,7 +46,8 @@ class Rows:
         self.plan = plan(model.reduced, model.blocks, model.groups)
         self.normals = Normals.zero(self.plan)
         self.misclosures = tuple(np.zeros((len(g.columns), g.rows)) for g in model.groups)
-        self.parts = tuple(part for g in range(len(model.groups)) for part in self._parts(g))
+        parts = [part for g in range(len(model.groups)) for part in self._parts(g)]
+        self.parts = _reaching(parts, self.plan)
         self.count = sum(w.size for w in self.misclosures)
         self.weighing = None
 
@@ -73,8 +76,11 @@ class Rows:
 
     def _add(self, state, most):
         self.normals.clear()
+        wide, cleared = self.normals.wide, 0
         cost, weighing = 0.0, 0
         for part in self.parts:
+            wide[cleared : part.reach] = 0.0  # just before it is added to, while in the cache
+            cleared = part.reach
             part.fill(state, part.w, part.jac)
             cost += 0.5 * float(np.vdot(part.w, part.w))
             if most < np.inf and not cost <= most:
@@ -104,6 +110,17 @@ class Rows:
                 group.fill(state, w, jac)
             found.append(jac)
         return tuple(found)
+
+
+def _reaching(parts, plan):
+    """The parts, each with its `reach`; the last reaches to the end."""
+    found, last = [], 0
+    for part in parts:
+        blocks = [batch.block.max(initial=-1) for batch in part.batches if batch.block is not None]
+        last = max([last, *(block + 1 for block in blocks)])
+        end = plan.blocks if len(found) + 1 == len(parts) else last
+        found.append(replace(part, reach=3 * plan.starts[end]))
+    return tuple(found)
 
 
 def _within(batch, part, n):
