@@ -216,7 +216,7 @@ class _Work:
             lower, sound, reaction_part = self._root(scale, untouched, damping, held, tangent)
         if not sound:
             return self._look(state, damping, None)
-        untouched = np.flatnonzero(untouched)
+        untouched = untouched.nonzero()[0]
         return Factor(
             normals, scale, lower, untouched, null_space, datum_basis, tangent, reaction_part
         )

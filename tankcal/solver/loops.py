@@ -22,7 +22,6 @@ COMPILED = (
     "_add_blocks",
     "_root",
     "_forward",
-    "_forward_all",
     "_leave",
     "_sizes",
     "_eliminate",
@@ -167,18 +166,14 @@ def _root(v, damping, smallest):
     return True
 
 
-def _forward(v, b):
-    """b becomes L^-1 b."""
-    b[0] = b[0] / v[0]
-    b[1] = (b[1] - v[1] * b[0]) / v[2]
-    b[2] = (b[2] - v[3] * b[0] - v[4] * b[1]) / v[5]
-
-
-def _forward_all(v, b, o, wide, first, n, right):
-    """The wide part of block o, 3 n numbers from `first` on, becomes Y; right (n,) gains Y b."""
+def _forward(v, b, o, wide, first, n, right):
+    """b of block o becomes y, its wide part, 3 n numbers from first on, Y; right (n,) gains Y y."""
     l10, l20, l21 = v[o, 1], v[o, 3], v[o, 4]
     i0, i1, i2 = 1.0 / v[o, 0], 1.0 / v[o, 2], 1.0 / v[o, 5]
-    b0, b1, b2 = b[o, 0], b[o, 1], b[o, 2]
+    b0 = b[o, 0] * i0
+    b1 = (b[o, 1] - l10 * b0) * i1
+    b2 = (b[o, 2] - l20 * b0 - l21 * b1) * i2
+    b[o, 0], b[o, 1], b[o, 2] = b0, b1, b2
     one = np.uintp(first)
     two, three = one + np.uintp(n), one + np.uintp(2 * n)
     for a in range(np.uintp(n)):
@@ -224,8 +219,7 @@ def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, sm
         for o in range(begin, end):
             if not _root(v[o], damping, smallest):
                 return o
-            _forward(v[o], b[o])
-            _forward_all(v, b, o, wide, 3 * starts[o], n, right)
+            _forward(v, b, o, wide, 3 * starts[o], n, right)
         edges = ends[runs[begin] : runs[begin + 1] + 1]
         _leave(t, columns[first : first + n], edges, first, wide, 3 * (end - begin), square)
         for a in range(n):

@@ -143,14 +143,14 @@ def assemble(survey):
 def _refuse_coincident(survey, groups, state):
     """Raise when a sight starts with both its ends at one place: it has no derivatives there."""
     for one in groups:
-        bad = np.flatnonzero(one.without_derivatives(state))
-        if len(bad):
+        bad = one.without_derivatives(state)
+        if bad.any():
             raise SolutionError(
                 message(
                     "ends_coincide",
                     "both ends of {observation} have the same approximate place: the "
                     "points have too few observations, or one point has two names",
-                    observation=told(survey, one, bad[0]),
+                    observation=told(survey, one, int(np.argmax(bad))),
                 )
             )
 
@@ -172,8 +172,7 @@ def _set_aside(survey):
         return ("",) * len(bad)
     rays = np.zeros(len(bad), dtype=int)
     if images is not None:
-        seen = images.point[images.in_use]
-        rays += np.bincount(seen, minlength=len(bad))
+        rays += np.bincount(images.of_used("point"), minlength=len(bad))
     names = zip(survey.points, rays.tolist(), bad, strict=True)
     return tuple(_poor(name, count) if is_bad else "" for name, count, is_bad in names)
 
@@ -199,8 +198,7 @@ def one_ray_sentence(name):
 def _refuse_poor_photos(survey):
     """Raise when a photo has fewer observations than unknowns."""
     images, photos = survey.image_points, survey.photos
-    seen = images.photo[images.in_use]
-    rays = np.bincount(seen, minlength=len(photos.names))
+    rays = np.bincount(images.of_used("photo"), minlength=len(photos.names))
     count = 2 * rays
     for one in survey.observations:
         if hasattr(one, "photo"):
@@ -231,8 +229,7 @@ def _others(survey, used, centre):
         for name in one.ties:
             keep &= used[getattr(one, name)]
         holds = one.exact
-        sharp = np.flatnonzero(keep & holds & one.in_use)
-        if len(sharp):
+        if holds.any() and (sharp := np.flatnonzero(keep & holds & one.in_use)).size:
             taken = one.taken(sharp).relative(centre)
             exact.append(Held(taken, *taken.conditions(), number, sharp))
             if holds.all():
@@ -325,10 +322,10 @@ def _image_groups(survey, used, layout, reduced, table):
                 "an image coordinate cannot hold exactly: its sd must be above zero",
             )
         )
-    first = layout.points[images.point, 0]
-    last = np.count_nonzero(layout.points[:, 0] >= reduced)
-    key = np.where(first < reduced, last, (first - reduced) // 3)
-    key = key.astype(np.min_scalar_type(last))  # sorted faster
+    first = layout.points[:, 0]
+    last = np.count_nonzero(first >= reduced)
+    of_point = np.where(first < reduced, last, (first - reduced) // 3)
+    key = of_point.astype(np.min_scalar_type(last)).take(images.point)  # sorted faster
     for form, order in survey.by_form(images):
         left = table[[survey.cameras[camera].form == form for camera in survey.photos.camera]]
         if not used.all():

@@ -12,11 +12,13 @@ HANGING = 0.03  # see datum.UNFELT: what holds the survey so weakly, noise alone
 
 def refuse_worthless_cameras(survey, problem, solution):
     """Raise SolutionError when the network does not determine a principal distance c."""
-    columns = problem.layout.interior[problem.interior_of[:, 0]]
-    columns, photo = np.unique(columns, return_index=True)
-    columns, photo = columns[columns >= 0], photo[columns >= 0]
-    if not len(columns):
+    first = {}
+    for photo, column in enumerate(problem.layout.interior[problem.interior_of[:, 0]].tolist()):
+        first.setdefault(column, photo)
+    columns = sorted(column for column in first if column >= 0)
+    if not columns:
         return
+    photo = [first[column] for column in columns]
     unit = np.zeros((problem.model.reduced, len(columns)))
     unit[columns, np.arange(len(columns))] = 1.0
     sd = np.sqrt(np.sum(solution.cofactor.factor.whitened(unit) ** 2, axis=0))

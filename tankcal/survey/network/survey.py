@@ -215,8 +215,7 @@ class Survey:
         count = np.zeros(len(self.points), dtype=int)
         for one in self.tables.values():
             for name in one.ties:
-                point = getattr(one, name)[one.in_use]
-                count += one.rows * np.bincount(point, minlength=len(count))
+                count += one.rows * np.bincount(one.of_used(name), minlength=len(count))
         return count if self.fixed is None else count + self.fixed.sum(axis=1)
 
     def without(self, sources):

@@ -46,6 +46,8 @@ def layout_of(survey, eliminated, used, interior_free, table):
     def columns(free):
         nonlocal next_column
         found = np.full(free.shape, -1)
+        if not free.size:
+            return found
         count = int(np.count_nonzero(free))
         found[free] = np.arange(next_column, next_column + count)
         next_column += count

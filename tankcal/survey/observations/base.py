@@ -79,20 +79,22 @@ class Layout:
     def moved(self, state, step):
         """The state after a step (unknowns,); rotations are turned, everything else is added."""
         step = np.append(step, 0.0)  # column -1, the fixed ones, does not move
-        photos, system = step[self.photos], step[self.system]
+        photos = step[self.photos]
         changes = {"xyz_m": state.xyz_m + step[self.points]}
         if len(photos):
             changes["photo_xyz_m"] = state.photo_xyz_m + photos[:, :3]
             changes["rotation"] = apply_small_rotation(state.rotation, photos[:, 3:])
             changes["interior"] = state.interior + step[self.interior]
         changes["nuisance"] = {
-            of: value + step[self.nuisance[of]] for of, value in state.nuisance.items()
+            of: value + step[self.nuisance[of]] if len(value) else value
+            for of, value in state.nuisance.items()
         }
-        if len(system):
+        if len(self.system):
+            system = step[self.system]
             changes["system"] = apply_small_rotation(state.system, system[:, :3])
             changes["system_shift_m"] = state.system_shift_m + system[:, 3:6]
             changes["system_scale"] = state.system_scale + system[:, 6]
-        return replace(state, **changes)
+        return State(**(vars(state) | changes))
 
 
 @dataclass(frozen=True)
@@ -141,6 +143,11 @@ class Observations:
     def in_use(self):
         """(n,) True for those that take part."""
         return np.ones(len(self), dtype=bool) if self.use is None else np.asarray(self.use) > 0
+
+    def of_used(self, name):
+        """The field of that name, of those that take part."""
+        field = getattr(self, name)
+        return field if self.use is None else field[self.in_use]
 
     @property
     def exact(self):
@@ -225,7 +232,7 @@ class Observations:
 
     def difference(self, computed):
         """Computed minus observed (n, m)."""
-        return computed - np.reshape(self.value, computed.shape)
+        return computed - np.asarray(self.value).reshape(computed.shape)
 
     def part(self, rows):
         """What fills some of the rows alone, a slice of them, see `fill`."""
