@@ -129,7 +129,7 @@ def test_rows_added_by_loops_are_those_of_arrays(m, monkeypatch):
         normals = Normals.zero(plan)
         for batch in plan.batches:
             both = rows[batch.group]
-            w, jac = both[:, :, -1], np.ascontiguousarray(both[:, :, :-1])
+            w, jac = np.array(both[:, :, -1]), np.array(both[:, :, :-1])
             elimination.add_rows(plan, batch, batch.of(w), batch.of(jac), normals)
         normals.t[:-1, :-1] += np.tril(normals.t[:-1, :-1], -1).T  # arrays do so when eliminating
         upper = np.triu(normals.t[:-1, :-1])
