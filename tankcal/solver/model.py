@@ -115,14 +115,14 @@ class Normals:
     g: np.ndarray
 
     @classmethod
-    def zero(cls, plan):
-        """Nothing added yet."""
+    def empty(cls, plan):
+        """Room for them, to be cleared before anything is added."""
         return cls(
-            np.zeros((plan.blocks, 6)),
-            np.zeros((plan.blocks, 3)),
-            np.zeros(3 * len(plan.columns) + 1),
-            np.zeros((plan.reduced + 1, plan.reduced + 1)),
-            np.zeros(plan.reduced + 1),
+            np.empty((plan.blocks, 6)),
+            np.empty((plan.blocks, 3)),
+            np.empty(3 * len(plan.columns) + 1),
+            np.empty((plan.reduced + 1, plan.reduced + 1)),
+            np.empty(plan.reduced + 1),
         )
 
     def clear(self):

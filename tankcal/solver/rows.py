@@ -44,7 +44,7 @@ class Rows:
     def __init__(self, model):
         self.model = model
         self.plan = plan(model.reduced, model.blocks, model.groups)
-        self.normals = Normals.zero(self.plan)
+        self.normals = Normals.empty(self.plan)
         self.misclosures = tuple(np.zeros((len(g.columns), g.rows)) for g in model.groups)
         parts = [part for g in range(len(model.groups)) for part in self._parts(g)]
         self.parts = _reaching(parts, self.plan)

@@ -101,7 +101,7 @@ def test_blocks_eliminated_together_give_what_they_give_one_by_one(monkeypatch):
     for join in (series._join_series, lambda together, alike: alike):
         monkeypatch.setattr(series, "_join_series", join)
         plan = model.plan(reduced, blocks, groups)
-        normals = Normals.zero(plan)
+        normals = zero_normals(plan)
         normals.v[:, [0, 2, 5]] = 1.0
         for batch in plan.batches:
             jac = batch.of(rows[batch.group])
@@ -126,7 +126,7 @@ def test_rows_added_by_loops_are_those_of_arrays(m, monkeypatch):
     rows = [rng.normal(size=(len(one.columns), m, one.columns.shape[1] + 1)) for one in groups]
 
     def added():
-        normals = Normals.zero(plan)
+        normals = zero_normals(plan)
         for batch in plan.batches:
             both = rows[batch.group]
             w, jac = np.array(both[:, :, -1]), np.array(both[:, :, :-1])
@@ -144,6 +144,14 @@ def test_rows_added_by_loops_are_those_of_arrays(m, monkeypatch):
         assert one == pytest.approx(other, abs=1e-12)
 
 
+def zero_normals(plan):
+    """Normals to which nothing was added yet."""
+    normals = Normals.empty(plan)
+    for array in vars(normals).values():
+        array.fill(0.0)
+    return normals
+
+
 def among(plan, normals, unknowns):
     """How unknowns follow the reduced ones, and what their blocks add to their cofactors."""
     own = np.zeros((len(unknowns), len(unknowns)))
@@ -155,7 +163,7 @@ def among(plan, normals, unknowns):
 def test_elimination_by_loops_is_that_of_arrays(panel, monkeypatch):
     rng, reduced, blocks = np.random.default_rng(7), 15, 12
     plan = model.plan(reduced, blocks, groups_of(rng, reduced, blocks))
-    first, second = Normals.zero(plan), Normals.zero(plan)
+    first, second = zero_normals(plan), zero_normals(plan)
     root = np.tril(rng.uniform(1, 2, (blocks, 3, 3)))
     first.v[:] = (root @ root.transpose(0, 2, 1))[:, *np.tril_indices(3)]
     for part in (first.wide[:-1], first.b, first.t[:-1, :-1], first.g[:-1]):
@@ -191,7 +199,7 @@ def test_the_wide_part_has_three_rows_a_block():
     """Closed form: number 10 c + i at column c and unknown i of a block."""
     reduced, blocks = 15, 12
     plan = model.plan(reduced, blocks, groups_of(np.random.default_rng(3), reduced, blocks))
-    normals = Normals.zero(plan)
+    normals = zero_normals(plan)
     normals.wide[plan.entries[:-1]] = 10 * plan.columns[:, None] + np.arange(3)
     dense = elimination.block_rows(plan, normals.wide).toarray().reshape(blocks, 3, reduced)
     for o in range(blocks):
