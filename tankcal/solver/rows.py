@@ -6,6 +6,7 @@ would take more memory than everything else together.
 """
 
 from dataclasses import dataclass, replace
+from itertools import accumulate
 
 import numpy as np
 
@@ -22,14 +23,12 @@ class Part:
 
     fill     see Group, of these alone       batches  their Batches, rows counted within the part
     w, jac   (n, m) and (n, m, K), filled; the jac of a part is that of others of its group, too
-    reach    numbers of the wide part up to the last that these rows or those before them meet
     """
 
     fill: object
     batches: tuple
     w: np.ndarray
     jac: np.ndarray
-    reach: int = 0
 
 
 class Rows:
@@ -38,6 +37,7 @@ class Rows:
     plan         Plan of all groups                   normals  Normals, as they were added last
     misclosures  tuple of (n, m) whitened, one array a group, as they were evaluated last
     parts        tuple of Part
+    reach        how far into the wide part of the normal equations each or those before it reach
     count        number of rows                       weighing  of those with any derivative
     """
 
@@ -46,8 +46,8 @@ class Rows:
         self.plan = plan(model.reduced, model.blocks, model.groups)
         self.normals = Normals.empty(self.plan)
         self.misclosures = tuple(np.zeros((len(g.columns), g.rows)) for g in model.groups)
-        parts = [part for g in range(len(model.groups)) for part in self._parts(g)]
-        self.parts = _reaching(parts, self.plan)
+        self.parts = tuple(part for g in range(len(model.groups)) for part in self._parts(g))
+        self.reach = tuple(accumulate((self._reach(part) for part in self.parts), max))
         self.count = sum(w.size for w in self.misclosures)
         self.weighing = None
 
@@ -66,6 +66,11 @@ class Rows:
             parts.append(Part(group.part(rows), mine, w[rows], jac[: rows.stop - start]))
         return parts
 
+    def _reach(self, part):
+        blocks = [batch.block for batch in part.batches if batch.block is not None]
+        last = max((block.max(initial=-1) for block in blocks), default=-1)
+        return 3 * self.plan.starts[last + 1]
+
     def add(self, state, most=np.inf):
         """Evaluate all rows at a state, add them to new normal equations; see `evaluate`.
 
@@ -78,9 +83,9 @@ class Rows:
         self.normals.clear()
         wide, cleared = self.normals.wide, 0
         cost, weighing = 0.0, 0
-        for part in self.parts:
-            wide[cleared : part.reach] = 0.0  # just before it is added to, while in the cache
-            cleared = part.reach
+        for part, reach in zip(self.parts, self.reach, strict=True):
+            wide[cleared:reach] = 0.0  # just before it is added to: so it stays in the cache
+            cleared = reach
             part.fill(state, part.w, part.jac)
             cost += 0.5 * float(np.vdot(part.w, part.w))
             if most < np.inf and not cost <= most:
@@ -89,6 +94,7 @@ class Rows:
                 add_rows(self.plan, batch, batch.of(part.w), batch.of(part.jac), self.normals)
             if self.weighing != self.count:
                 weighing += int(np.count_nonzero(part.jac.any(axis=2)))
+        wide[cleared:] = 0.0
         if self.weighing != self.count:  # a row may have none at the start alone
             self.weighing = weighing
         return cost if np.isfinite(cost) else np.inf
@@ -110,17 +116,6 @@ class Rows:
                 group.fill(state, w, jac)
             found.append(jac)
         return tuple(found)
-
-
-def _reaching(parts, plan):
-    """The parts, each with its `reach`; the last reaches to the end."""
-    found, last = [], 0
-    for part in parts:
-        blocks = [batch.block.max(initial=-1) for batch in part.batches if batch.block is not None]
-        last = max([last, *(block + 1 for block in blocks)])
-        end = plan.blocks if len(found) + 1 == len(parts) else last
-        found.append(replace(part, reach=3 * plan.starts[end]))
-    return tuple(found)
 
 
 def _within(batch, part, n):
