@@ -341,8 +341,7 @@ def _image_groups(survey, used, layout, reduced, table):
         order = order[np.argsort(of_photo, kind="stable")]
         active = np.flatnonzero((left < layout.interior.size - 1).any(axis=0))
         active = active[(layout.interior[left[:, active]] >= 0).any(axis=0)]
-        one = replace(images.taken(order), form=form, active=active, interior_of=table)
-        yield one, order
+        yield images.taken(order, form=form, active=active, interior_of=table), order
 
 
 def _state(survey, centre, values):

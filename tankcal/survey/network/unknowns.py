@@ -54,9 +54,10 @@ def layout_of(survey, eliminated, used, interior_free, table):
         return found
 
     own = _of_one_photo(table, interior_free)
-    interior = columns(interior_free & ~own.any(axis=0))
-    both = columns(np.hstack([free_photos, own[:, own.any(axis=0)]]))  # each photo's own together
-    of_photos, interior[own.any(axis=0)] = both[:, :6], both[:, 6:].max(axis=0, initial=-1)
+    mine = own.any(axis=0)
+    interior = columns(interior_free & ~mine)
+    both = columns(np.hstack([free_photos, own[:, mine]]))  # each photo's own together
+    of_photos, interior[mine] = both[:, :6], both[:, 6:].max(axis=0, initial=-1)
     nuisance = {of: columns(one.sd != 0) for of, one in survey.nuisances.items()}
     system = columns(free_system)
     of_points = columns(free_points & ~eliminated[:, None])

@@ -182,8 +182,8 @@ class Observations:
         """(n,) True where no derivative exists: both ends of a sight are at one place."""
         return np.zeros(len(self), dtype=bool)
 
-    def taken(self, keep):
-        """The observations `keep` (indices, a mask or a slice)."""
+    def taken(self, keep, **changes):
+        """The observations `keep` (indices, a mask or a slice), other fields changed."""
         if not isinstance(keep, slice):
             keep = np.asarray(keep)
             keep = keep.nonzero()[0] if keep.dtype == bool else keep
@@ -194,9 +194,9 @@ class Observations:
             and name in self.__dataclass_fields__
             and name not in self.shared
         }
-        if self.trace is not None:
+        if self.trace is not None and "trace" not in changes:
             parts["trace"] = self.trace.taken(keep)
-        return replace(self, **parts)
+        return replace(self, **parts, **changes)
 
     def using(self, use):
         """The same observations, each with its share (n,)."""
@@ -236,7 +236,7 @@ class Observations:
 
     def part(self, rows):
         """What fills some of the rows alone, a slice of them, see `fill`."""
-        return replace(self, trace=None).taken(rows).fill
+        return self.taken(rows, trace=None).fill
 
     def fill(self, state, w, jac):
         """Whitened misclosures into w (n, m), derivatives into jac (n, m, K) unless it is empty."""
