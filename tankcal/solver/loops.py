@@ -13,9 +13,12 @@ whether one that might be negative is counted from the end.
 
 import numpy as np
 
-PANEL = 32  # columns of Y whose products with those after them are taken at once
+PANEL = 64  # columns of Y whose products with those after them are taken at once
+WIDE = 264  # of those after them, at most, and not a power of two: lines of the cache differ
 COMPILED = (
     "_is_alike",
+    "_spread",
+    "_pack",
     "_square",
     "_product",
     "_add_squares",
@@ -43,29 +46,25 @@ def _add_squares(w, jac, skip, first, cuts, t, g):
     """
     n, m, width = jac.shape
     k, runs = width - skip, len(cuts) - 1
-    flat, errors = jac.reshape(jac.size), w.reshape(w.size)
-    square, product = np.empty((k + 1) * k), np.empty(k)
+    flat, errors, flat_t = jac.reshape(jac.size), w.reshape(w.size), t.reshape(t.size)
+    pack, square, product = np.zeros(12 * WIDE), np.empty((PANEL + 1) * WIDE), np.empty(k)
     end = n if runs == 0 else 0
     while end < n:
         begin, end = end, end + 1
         while end < n and _is_alike(first, end, begin):
             end += 1
-        _square(flat, m * begin * width + skip, width, m * (end - begin), 0, k, k, square)
-        _product(flat, m * begin * width + skip, width, errors[m * begin : m * end], product)
+        at, own = m * begin * width + skip, first[begin]
+        for low in range(0, k, PANEL):
+            high = min(low + PANEL, k)
+            for left in range(low, k, WIDE):
+                right = min(left + WIDE, k)
+                _square(flat, at, width, m * (end - begin), low, high, left, right, pack, square)
+                _spread(1.0, own, cuts, low, high, left, right, square, flat_t, len(g))
+        _product(flat, at, width, errors[m * begin : m * end], product)
         for one in range(runs):
             to = first[begin, one] - cuts[one]
             for a in range(cuts[one], cuts[one + 1]):
                 g[to + a] += product[a]
-            for other in range(one, runs):
-                by = first[begin, other] - cuts[other]
-                if by + cuts[other] >= to + cuts[one]:
-                    for a in range(cuts[one], cuts[one + 1]):
-                        for q in range(max(a, cuts[other]), cuts[other + 1]):
-                            t[to + a, by + q] += square[a * k + q]
-                else:
-                    for q in range(cuts[other], cuts[other + 1]):
-                        for a in range(cuts[one], cuts[one + 1]):
-                            t[by + q, to + a] += square[a * k + q]
 
 
 def _is_alike(first, i, j):
@@ -75,37 +74,79 @@ def _is_alike(first, i, j):
     return alike
 
 
-def _square(flat, first, width, rows, low, high, n, out):
-    """Y'Y, the upper half of its rows from low to high, into out, n numbers a row and a row more.
+def _spread(sign, first, cuts, low, high, left, right, square, flat, width):
+    """Add a part of a square, as _square leaves it, or take it, to the upper half of t.
 
-    The n numbers of a row of Y begin at first, those of the next after width. Six rows by two
-    columns at a time: what is read is used often, and still fits into the registers.
+    first (s,) and cuts (s + 1,) of the runs of its columns, see Batch; sign 1 or -1
+    flat, width  t as one row, and how many numbers it has in a row
     """
-    step, k, last = np.uintp(width), np.uintp(n), np.uintp(high - 1)
-    for i in range(np.uintp(low * n), np.uintp(high * n)):
-        out[i - np.uintp(low * n)] = 0.0
+    for one in range(len(first)):
+        to = first[one] - cuts[one]
+        begin, end = max(cuts[one], low), min(cuts[one + 1], high)
+        for other in range(one, len(first)):
+            by = first[other] - cuts[other]
+            start, stop = max(cuts[other], left), min(cuts[other + 1], right)
+            if by + cuts[other] >= to + cuts[one]:
+                for a in range(begin, end):
+                    start = max(a, start)
+                    at = np.uintp((a - low) * WIDE + start - left)
+                    into = np.uintp((to + a) * width + by + start)
+                    for q in range(np.uintp(max(stop - start, 0))):
+                        flat[into + q] += sign * square[at + q]
+            else:
+                for q in range(start, stop):
+                    at = q - left - low * WIDE
+                    for a in range(begin, end):
+                        flat[(by + q) * width + to + a] += sign * square[at + a * WIDE]
+
+
+def _square(flat, first, width, rows, low, high, left, right, pack, out):
+    """The part of Y'Y on and above its diagonal, rows low to high and columns left to right.
+
+    The numbers of a row of Y begin at first, those of the next after width. left is low, or after
+    high. Out gets WIDE numbers a row, and a row more. Six rows of Y are copied to pack and
+    multiplied two columns at a time: what is read is used often, and as all distances are known
+    the compiler need not ask whether what it writes lies where it reads.
+    """
+    n, own = np.uintp(right - left), 0
+    for a in range(np.uintp(high - low)):
+        for q in range(n):
+            out[a * np.uintp(WIDE) + q] = 0.0
     for row in range(0, rows, 6):
-        h1, h2, h3 = rows > row + 1, rows > row + 2, rows > row + 3
-        h4, h5 = rows > row + 4, rows > row + 5  # False: no row there, the last one counts once
-        y0 = np.uintp(first + row * width)
-        y1 = y0 + step * np.uintp(h1)
-        y2 = y1 + step * np.uintp(h2)
-        y3 = y2 + step * np.uintp(h3)
-        y4 = y3 + step * np.uintp(h4)
-        y5 = y4 + step * np.uintp(h5)
-        for a in range(np.uintp(low), np.uintp(high), np.uintp(2)):
-            b = min(a + np.uintp(1), last)
-            to = (a - np.uintp(low)) * k
-            below = to + k
-            a0, a1, a2 = flat[y0 + a], h1 * flat[y1 + a], h2 * flat[y2 + a]
-            a3, a4, a5 = h3 * flat[y3 + a], h4 * flat[y4 + a], h5 * flat[y5 + a]
-            b0, b1, b2 = flat[y0 + b], h1 * flat[y1 + b], h2 * flat[y2 + b]
-            b3, b4, b5 = h3 * flat[y3 + b], h4 * flat[y4 + b], h5 * flat[y5 + b]
-            for q in range(a, k):
-                q0, q1, q2 = flat[y0 + q], flat[y1 + q], flat[y2 + q]
-                q3, q4, q5 = flat[y3 + q], flat[y4 + q], flat[y5 + q]
+        at = first + row * width
+        _pack(flat, at + left, width, rows - row, n, 0, pack)
+        if left > low:
+            own = 6 * WIDE
+            _pack(flat, at + low, width, rows - row, np.uintp(high - low), own, pack)
+        for a in range(low, high, 2):
+            i = np.uintp(own + a - low)
+            a0, b0 = pack[i], pack[i + np.uintp(1)]
+            a1, b1 = pack[i + np.uintp(WIDE)], pack[i + np.uintp(WIDE + 1)]
+            a2, b2 = pack[i + np.uintp(2 * WIDE)], pack[i + np.uintp(2 * WIDE + 1)]
+            a3, b3 = pack[i + np.uintp(3 * WIDE)], pack[i + np.uintp(3 * WIDE + 1)]
+            a4, b4 = pack[i + np.uintp(4 * WIDE)], pack[i + np.uintp(4 * WIDE + 1)]
+            a5, b5 = pack[i + np.uintp(5 * WIDE)], pack[i + np.uintp(5 * WIDE + 1)]
+            to = np.uintp((a - low) * WIDE)
+            for q in range(np.uintp(max(a - left, 0)), n):
+                q0, q1 = pack[q], pack[q + np.uintp(WIDE)]
+                q2, q3 = pack[q + np.uintp(2 * WIDE)], pack[q + np.uintp(3 * WIDE)]
+                q4, q5 = pack[q + np.uintp(4 * WIDE)], pack[q + np.uintp(5 * WIDE)]
                 out[to + q] += a0 * q0 + a1 * q1 + a2 * q2 + a3 * q3 + a4 * q4 + a5 * q5
-                out[below + q] += b0 * q0 + b1 * q1 + b2 * q2 + b3 * q3 + b4 * q4 + b5 * q5
+                out[to + q + np.uintp(WIDE)] += (
+                    b0 * q0 + b1 * q1 + b2 * q2 + b3 * q3 + b4 * q4 + b5 * q5
+                )
+
+
+def _pack(flat, first, width, rows, n, to, pack):
+    """Copy n numbers of each of six rows, zeros where there are fewer, to WIDE apart."""
+    for row in range(6):
+        i, at = np.uintp(to + row * WIDE), np.uintp(first + row * width)
+        if row < rows:
+            for q in range(n):
+                pack[i + q] = flat[at + q]
+        else:
+            for q in range(n):
+                pack[i + q] = 0.0
 
 
 def _product(flat, first, width, errors, out):
@@ -184,25 +225,18 @@ def _forward(v, b, o, wide, first, n, right):
         right[a] += y0 * b0 + y1 * b1 + y2 * b2
 
 
-def _leave(t, columns, runs, first, wide, rows, square):
-    """Take Y'Y, its upper half, from the places of its columns in t; Y (rows, n) from 3 first on.
+def _leave(flat, width, columns, cuts, at, wide, rows, pack, square):
+    """Take Y'Y, its upper half, from the places of its columns in t; Y (rows, n) begins at `at`.
 
-    Of many columns PANEL at a time are multiplied by themselves and those after them.
+    columns (s,) the first of each run of them, cuts (s + 1,) where the runs begin, n at the end
     """
-    n, one = len(columns), 0
-    width, flat = t.shape[1], t.reshape(t.size)
+    n = cuts[-1]
     for low in range(0, n, PANEL):
         high = min(low + PANEL, n)
-        _square(wide, 3 * first, n, rows, low, high, n, square)
-        for a in range(low, high):
-            if runs[one + 1] - first == a:
-                one += 1
-            line, of = columns[a] * width, (a - low) * n
-            for other in range(one, len(runs) - 1):
-                begin = max(a, runs[other] - first)
-                to, at = np.uintp(line + columns[begin]), np.uintp(of + begin)
-                for q in range(np.uintp(runs[other + 1] - first - begin)):
-                    flat[to + q] -= square[at + q]
+        for left in range(low, n, WIDE):
+            right = min(left + WIDE, n)
+            _square(wide, at, n, rows, low, high, left, right, pack, square)
+            _spread(-1.0, columns, cuts, low, high, left, right, square, flat, width)
 
 
 def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, smallest):
@@ -211,7 +245,9 @@ def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, sm
     Blocks alike[k] to alike[k + 1] have the same columns: they leave t together.
     """
     longest, _ = _sizes(starts, alike)
-    right, square = np.empty(longest), np.empty((PANEL + 1) * longest)
+    right, pack, square = np.empty(longest), np.zeros(12 * WIDE), np.empty((PANEL + 1) * WIDE)
+    heads, cuts = np.empty(longest, dtype=np.int64), np.empty(longest + 1, dtype=np.int64)
+    flat = t.reshape(t.size)
     for k in range(len(alike) - 1):
         begin, end, first = alike[k], alike[k + 1], starts[alike[k]]
         n = starts[begin + 1] - first
@@ -221,7 +257,14 @@ def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, sm
                 return o
             _forward(v, b, o, wide, 3 * starts[o], n, right)
         edges = ends[runs[begin] : runs[begin + 1] + 1]
-        _leave(t, columns[first : first + n], edges, first, wide, 3 * (end - begin), square)
+        for run in range(len(edges) - 1):
+            heads[run] = columns[edges[run]]
+        for run in range(len(edges)):
+            cuts[run] = edges[run] - first
+        own, at = heads[: len(edges) - 1], cuts[: len(edges)]
+        _leave(
+            flat, len(g), own, at, 3 * first, wide, 3 * (end - begin), pack, square
+        )  # fmt: skip
         for a in range(n):
             g[columns[first + a]] -= right[a]
     return -1

@@ -159,8 +159,8 @@ def among(plan, normals, unknowns):
     return elimination.through_reduced(plan, normals, unknowns), own
 
 
-@pytest.mark.parametrize("panel", [4, loops.PANEL])
-def test_elimination_by_loops_is_that_of_arrays(panel, monkeypatch):
+@pytest.mark.parametrize(("panel", "wide"), [(4, 5), (loops.PANEL, loops.WIDE)])
+def test_elimination_by_loops_is_that_of_arrays(panel, wide, monkeypatch):
     rng, reduced, blocks = np.random.default_rng(7), 15, 12
     plan = model.plan(reduced, blocks, groups_of(rng, reduced, blocks))
     first, second = zero_normals(plan), zero_normals(plan)
@@ -179,6 +179,7 @@ def test_elimination_by_loops_is_that_of_arrays(panel, monkeypatch):
     some = rng.permutation(reduced + 3 * blocks)[:-5]
     among_of_arrays = among(plan, first, some)
     monkeypatch.setattr(loops, "PANEL", panel)
+    monkeypatch.setattr(loops, "WIDE", wide)
     monkeypatch.setattr(elimination, "is_worth_compiling", lambda rows=0: True)
     plain = SimpleNamespace(**{name: vars(loops)[name] for name in loops.COMPILED})
     monkeypatch.setattr(elimination, "compile_functions", lambda module, names: plain)
