@@ -13,8 +13,8 @@ whether one that might be negative is counted from the end.
 
 import numpy as np
 
-PANEL = 64  # columns of Y whose products with those after them are taken at once
-WIDE = 264  # of those after them, at most, and not a power of two: lines of the cache differ
+PANEL = 64  # columns whose products with those after them are taken at once; an even number
+WIDE = 264  # of those after them, at most, and no power of two: rows share no lines of the cache
 COMPILED = (
     "_is_alike",
     "_spread",

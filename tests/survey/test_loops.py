@@ -115,8 +115,9 @@ def test_blocks_eliminated_together_give_what_they_give_one_by_one(monkeypatch):
         assert one == pytest.approx(other, abs=1e-11)
 
 
+@pytest.mark.parametrize(("panel", "wide"), [(2, 3), (loops.PANEL, loops.WIDE)])
 @pytest.mark.parametrize("m", [1, 2, 3, 7])
-def test_rows_added_by_loops_are_those_of_arrays(m, monkeypatch):
+def test_rows_added_by_loops_are_those_of_arrays(m, panel, wide, monkeypatch):
     """Neighbours with the same columns, in series of one row and of many; runs in any order."""
     rng, reduced, blocks = np.random.default_rng(23), 15, 12
     groups = groups_of(rng, reduced, blocks)
@@ -136,6 +137,8 @@ def test_rows_added_by_loops_are_those_of_arrays(m, monkeypatch):
         return upper, normals.g[:-1], normals.v, normals.b, normals.wide[:-1]
 
     of_arrays = added()
+    monkeypatch.setattr(loops, "PANEL", panel)
+    monkeypatch.setattr(loops, "WIDE", wide)
     monkeypatch.setattr(elimination, "is_worth_compiling", lambda rows=0: True)
     plain = SimpleNamespace(**{name: vars(loops)[name] for name in loops.COMPILED})
     monkeypatch.setattr(elimination, "compile_functions", lambda module, names: plain)
