@@ -8,6 +8,7 @@ import json
 import shutil
 from contextlib import nullcontext
 from datetime import UTC, datetime
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Lock
@@ -119,10 +120,12 @@ def _forget():
 
 
 def _copy_fonts(folder):
-    """The fonts of the figures, from matplotlib; not its font of boxes for unknown signs."""
-    import matplotlib
+    """The fonts of the figures, from matplotlib; not its font of boxes for unknown signs.
 
-    fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
+    It need not be loaded for them, which takes as long as setting several pages.
+    """
+    (package,) = find_spec("matplotlib").submodule_search_locations
+    fonts = Path(package) / "mpl-data" / "fonts" / "ttf"
     for pattern in FONT_FILES:
         for path in fonts.glob(pattern):
             shutil.copyfile(path, Path(folder) / path.name)
