@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tankcal.record.covariance_factor import blocks_of
+from tankcal.record.plain_data import to_plain
 from tankcal.record.recomputation import compare_records
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -27,9 +29,10 @@ def record(factor, volumes=(0.0, 40.0, 500.0), drawn=0.0):
         "tankcal": "0.1.0",
         "versions": {"python": "3", "numpy": "2", "scipy": "1"},
         "capacity": {
+            "height_m": [0.0, 1.0, 2.0],
             "volume_m3": list(volumes),
             "inputs": inputs,
-            "factor_m3": np.asarray(factor).tolist(),
+            "factor": to_plain(blocks_of(factor)),
         },
         "monte_carlo": {"se_value": [drawn, 0.0]},
         "budgets": [{"monte_carlo": {"d_low": drawn}}],
