@@ -69,7 +69,8 @@ class Recomputation:
     different : int
         Of them, those that are not the same bit for bit.
     largest : NumberApart or None
-        The largest relative difference over its tolerance; None: all are the same.
+        The largest relative difference over its tolerance; None: all are the same, or others by
+        rounding alone.
     beyond : tuple of NumberApart
         The largest of each key that is beyond its tolerance.
     otherwise : tuple of (str, str, str)
