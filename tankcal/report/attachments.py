@@ -36,7 +36,7 @@ OF_RECORD = (
 LARGEST = 20_000_000  # bytes: a larger file stays beside the PDF, which names its digest
 LARGEST_PACKED = 5_000_000  # of long tables: the size that such a record.json has by them
 ZIP = b"PK\x03\x04"  # so begins a file that is packed already
-LEVEL = 4  # of packing: the typesetter's own, 6, takes three times as long for 5 % less
+LEVEL = 1  # of packing: the typesetter's own, 6, takes five times as long for 6 % less
 _TYPE, _DEFLATED = b"/Type/EmbeddedFile", b"/Filter/FlateDecode"
 _HELD = re.compile(
     rb"<</Length \d+/Type/EmbeddedFile(/Filter/FlateDecode)?(/Subtype/[^/<>]+/Params<</Size )\d+"
