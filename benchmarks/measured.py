@@ -24,6 +24,8 @@ ROOT = Path(__file__).resolve().parent.parent
 SHARED = Path(os.environ.get("TANKCAL_DATA", ROOT.parent / "shared"))
 ROUNDS = int(os.environ.get("ROUNDS", 5))
 MOST_DIGITS = 16.0
+# Whoever installs tankcal has it compiled: without this each command would compile it anew, 0.6 s.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
 @dataclass(frozen=True)

@@ -125,6 +125,14 @@ def _numbers(again):
             "computed again: {count} numbers, all the same bit for bit",
             count=again.numbers,
         )
+    elif again.largest is None:
+        yield message(
+            "verify_rounded_numbers",
+            "computed again: {count} numbers, {different} not the same bit for bit, all of them "
+            "by rounding alone",
+            count=again.numbers,
+            different=again.different,
+        )
     else:
         one = again.largest
         yield message(

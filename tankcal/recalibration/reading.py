@@ -12,10 +12,11 @@ from tankcal.messages import message
 from tankcal.recalibration.declared import Declared, read_declared
 from tankcal.recalibration.former import FormerRoof, FormerTable
 from tankcal.record import load
+from tankcal.record.covariance_factor import factor_of
 
 MOST_FINDINGS = 20  # of the linter, that a refusal repeats
 USUAL_K = 2.0
-COLUMNS = ("volume_m3", "stated_U_m3", "k", "factor_m3")  # of a table in a record
+COLUMNS = ("volume_m3", "stated_U_m3", "k")  # of a table in a record
 _RECORD_VALUES = (
     "reference_temperature_c", "liquid_density_kg_m3", "reference_height_m", "date", "method",
     "laboratory", "number", "kind", "dip_from_a_m",
@@ -265,7 +266,7 @@ def _of_record(path, record, declared, log):
         k=float(np.median(table["k"])),
         common=declared["common"],
         roof=_roof_of(record) or declared.roof,
-        factor_m3=np.array(table["factor_m3"], dtype=float),
+        factor_m3=factor_of(table),
         record=record,
         **values,
     )
@@ -274,21 +275,25 @@ def _of_record(path, record, declared, log):
 def _refuse_unequal(table, path, log):
     """InputError for columns of a record's table that are not as long as its heights."""
     rows = len(table["height_m"])
-    for name in COLUMNS:
-        if len(table[name]) != rows:
+    lengths = {name: len(table[name]) for name in COLUMNS}
+    lengths["factor"] = sum(block["rows"] for block in table["factor"])
+    for name, length in lengths.items():
+        if length != rows:
             expected = message(
                 "former_unequal_columns",
                 "found {found} values; expected {rows}, one for each height",
-                found=len(table[name]),
+                found=length,
                 rows=rows,
             )
             log.problem(path.name, expected, column=f"capacity.{name}")
-    width = {len(row) if isinstance(row, list) else 0 for row in table["factor_m3"]}
-    if len(width) > 1:
+    log.stop_if_problems()
+    try:
+        factor_of(table)
+    except ValueError:
         expected = message(
             "former_unequal_rows", "found rows of different length; expected as many values in each"
         )
-        log.problem(path.name, expected, column="capacity.factor_m3")
+        log.problem(path.name, expected, column="capacity.factor")
     log.stop_if_problems()
 
 

@@ -4,7 +4,7 @@ Every number is held against the one in its place. What is allowed between two m
 of the largest number of the same key (of all rows of a list): 1e-9 in the capacity table, 1e-6
 elsewhere, where a number may be the small difference of large ones (residuals, correlations).
 Two things are compared by what they say. The standard uncertainties of the inputs in each row,
-`capacity.factor_m3`, are one of many square roots F of the covariances F F' of the volumes (axes of
+`capacity.factor`, are one of many square roots F of the covariances F F' of the volumes (axes of
 an ellipsoid have no sign, those of a sphere no place): F F' is compared, of each kind of input by
 itself. And volumes, and what the draws found of them, are alike within 1e-14 of the fullest tank:
 it is how finely a computer can write them down.
@@ -20,6 +20,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from tankcal.record.columns import NO_INTEGER, Texts
+from tankcal.record.covariance_factor import factor_of
 from tankcal.record.long_tables import BY_COLUMNS, long_pairs
 from tankcal.record.making import record_of, record_of_adjustment
 
@@ -68,7 +69,8 @@ class Recomputation:
     different : int
         Of them, those that are not the same bit for bit.
     largest : NumberApart or None
-        The largest relative difference over its tolerance; None: all are the same.
+        The largest relative difference over its tolerance; None: all are the same, or others by
+        rounding alone.
     beyond : tuple of NumberApart
         The largest of each key that is beyond its tolerance.
     otherwise : tuple of (str, str, str)
@@ -180,7 +182,7 @@ def compare_records(record, found):
     (2, 1, 'capacity.volume_m3[1]', True)
     """
     was, now = ({}, {}), ({}, {})
-    tables, record, found = long_pairs(record, found)
+    tables, record, found = long_pairs(*map(_with_whole_factor, (record, found)))
     _sort(record, "", "", *was)
     _sort(found, "", "", *now)
     rounding = ROUNDING * _fullest(record)
@@ -207,6 +209,15 @@ def compare_records(record, found):
             *(one for _, others in of_tables for one in others),
         ),
     )
+
+
+def _with_whole_factor(record):
+    """The record with `factor_m3` in place of its blocks, whose rows and weights are a choice."""
+    capacity = record.get("capacity") or {}
+    if "factor" not in capacity:
+        return record
+    other = {name: value for name, value in capacity.items() if name != "factor"}
+    return record | {"capacity": other | {"factor_m3": factor_of(capacity).tolist()}}
 
 
 def _versions(record):

@@ -1,6 +1,7 @@
 """The capacity table in the record, with what stands beside its rows."""
 
 from tankcal.pipeline.chain import PARTS
+from tankcal.record.covariance_factor import FactorBlock, blocks_of
 from tankcal.record.schema import Finite, Saved, filled_from, key
 from tankcal.record.statements import intervals_of
 from tankcal.tank.dips import ProportionalParts, dip_label
@@ -9,7 +10,7 @@ LEAST_PART_M3 = 1e-4  # last place of a printed part: an error below it is not t
 
 
 class CapacityTable(Saved):
-    """The capacity table and its covariance: factor_m3 times its transpose."""
+    """The capacity table and its covariance: its factor, in blocks, times the transpose of that."""
 
     zero: str = key("what heights count from, a code")
     zero_m: Finite = key("height of the zero above the bottom")
@@ -26,9 +27,9 @@ class CapacityTable(Saved):
     high_m3: list[Finite] = key("interval that counts")
     interval: list[str] = key('where it comes from: "gum", or "monte_carlo", which does not agree')
     stated_U_m3: list[Finite] = key("as printed: the larger distance of the ends from the volume")
-    inputs: list[str] = key("name of each column of factor_m3")
+    inputs: list[str] = key("name of each column of the factor")
     input_kind: list[str] = key("kind of input, see below")
-    factor_m3: list[list[Finite]] = key("rows x inputs")
+    factor: list[FactorBlock] = key("rows x inputs, in blocks of rows")
 
 
 class InterpolationError(Saved):
@@ -79,6 +80,7 @@ def capacity_of(result):
             for kind, number in zip(kinds, numbers, strict=True)
         ],
         input_kind=kinds,
+        factor=blocks_of(table.factor_m3),
     )
 
 

@@ -1,5 +1,6 @@
 """The versions of the record, and what is added to an older one so that it is of the last."""
 
+from tankcal.record.covariance_factor import in_blocks
 from tankcal.record.plain_data import columns_of
 from tankcal.record.saved_formats import SavedFormat
 
@@ -7,9 +8,9 @@ VERSION = 2
 
 
 def _completed_draft(record, version):
-    """Version 1 from one of its drafts, which knew neither Monte Carlo nor deliveries."""
+    """A version from one of its drafts: of 1, which knew neither Monte Carlo nor deliveries."""
     if version != 1:
-        return record
+        return _with_factor_in_blocks(record)
     record = {"budgets": [], "rule": None, "monte_carlo": None, "proportional_parts": None} | record
     new = {"deliveries": record.get("deliveries") or []}
     if isinstance(record.get("budget"), list):
@@ -43,7 +44,15 @@ def _from_1(record):
         columns = columns_of(adjustment["residuals"], _READING)
         adjustment = {"held": []} | adjustment | {"residuals": columns}
         record = record | {"adjustment": adjustment}
-    return record | {"format": "tankcal-record/2"}
+    return _with_factor_in_blocks(record) | {"format": "tankcal-record/2"}
+
+
+def _with_factor_in_blocks(record):
+    """A record of version 2 from 1 or a draft of 2, which had the whole factor of the table."""
+    capacity = record.get("capacity")
+    if not isinstance(capacity, dict) or "factor_m3" not in capacity:
+        return record
+    return record | {"capacity": in_blocks(capacity)}
 
 
 _READING = (

@@ -119,6 +119,7 @@ def set_papers(notebook, directory, parts, progress=None, **handed):
     """
     from concurrent.futures import ThreadPoolExecutor
 
+    from tankcal.report.attachments import Packed
     from tankcal.report.document import BESIDE, blocks_of, last_cell
     from tankcal.report.notebook import execute, written
     from tankcal.report.pdf import pdf
@@ -128,13 +129,13 @@ def set_papers(notebook, directory, parts, progress=None, **handed):
     total = cells + len(parts) + 2
     progress = progress or (lambda done, total: None)
     ends = {name: last_cell(notebook, part) for name, part in parts}
-    pages = {}
+    pages, packed = {}, Packed()
 
     def on_cell(done):
         for name, part in parts:
             if ends[name] == done:
                 again = bool(part) and part not in BESIDE
-                pages[name] = pool.submit(pdf, blocks_of(notebook, part), directory, again)
+                pages[name] = pool.submit(pdf, blocks_of(notebook, part), directory, again, packed)
         progress(done, total)
 
     with ThreadPoolExecutor(WORKERS) as pool:  # the typesetter works outside Python

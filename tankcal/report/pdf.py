@@ -8,6 +8,7 @@ import json
 import shutil
 from contextlib import nullcontext
 from datetime import UTC, datetime
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Lock
@@ -30,11 +31,12 @@ _ALONE = Lock()
 FONT_FILES = ("STIXGeneral*.ttf", "DejaVuSerif*.ttf", "DejaVuSans.ttf")
 
 
-def pdf(blocks, folder=".", again=False):
+def pdf(blocks, folder=".", again=False, packed=None):
     """The blocks as the bytes of a PDF; the same blocks and attachments give the same bytes.
 
     folder   where the files lie that the document blocks attach
     again    whether a later document has the same blocks: what is known of them is kept for it
+    packed   attachments.Packed, where other papers hold the same files inside
 
     Raises TankcalError when the page cannot be set (a character that no font has, a broken SVG),
     or a file to be attached is not the one that it was.
@@ -43,16 +45,31 @@ def pdf(blocks, folder=".", again=False):
     blocks = [prepared(_with_formulas(block)) for block in shown]
     attached = attachments.contents(blocks, folder)
     files, blocks = _pictures_as_files(blocks)
-    files |= {f"attached-{name}": content for name, content in attached.items()}
     files["main.typ"] = (shipped_folder("report_templates") / "page.typ").read_bytes()
     files["blocks.json"] = json.dumps(blocks, ensure_ascii=False).encode("utf-8")
     long = any("table" in block["kind"] and len(block["rows"]) > LONG for block in blocks)
     with _ALONE if long else nullcontext():
-        made = _compile(files, _timestamp(blocks[0]["date"]))
+        made = _set(files, attached, _timestamp(blocks[0]["date"]), packed)
         if long and not again:
             _forget()
     field = next((block["field"] for block in blocks if block.get("field")), None)
     return with_signature_field(made, field) if field else made
+
+
+def _set(files, attached, timestamp, packed):
+    """Set the page with the digests of the attached files, which then come into their place.
+
+    Where they find no place, for the typesetter wrote a PDF of another form, it holds them itself.
+    """
+    if not attached:
+        return _compile(files, timestamp)
+    digests = {f"attached-{name}": digest.encode() for name, (digest, _) in attached.items()}
+    made = _compile(files | digests, timestamp)
+    held = attachments.hold(made, dict(attached.values()), packed or attachments.Packed())
+    if held is None:
+        whole = {f"attached-{name}": content for name, (_, content) in attached.items()}
+        held = _compile(files | whole, timestamp)
+    return held
 
 
 def _compile(files, timestamp):
@@ -103,10 +120,12 @@ def _forget():
 
 
 def _copy_fonts(folder):
-    """The fonts of the figures, from matplotlib; not its font of boxes for unknown signs."""
-    import matplotlib
+    """The fonts of the figures, from matplotlib; not its font of boxes for unknown signs.
 
-    fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
+    It need not be loaded for them, which takes as long as setting several pages.
+    """
+    (package,) = find_spec("matplotlib").submodule_search_locations
+    fonts = Path(package) / "mpl-data" / "fonts" / "ttf"
     for pattern in FONT_FILES:
         for path in fonts.glob(pattern):
             shutil.copyfile(path, Path(folder) / path.name)

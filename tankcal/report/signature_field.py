@@ -8,11 +8,10 @@ page, order and tag stay those that typst gave, so that the file is PDF/A-3a and
 import hashlib
 import re
 
+from tankcal.report.pdf_objects import head_of, objects_of
+
 LINK = b"/URI(tankcal:signature)"
 NAME = "signature"
-_START = re.compile(rb"startxref\s+(\d+)\s+%%EOF\s*\Z")
-_TABLE = re.compile(rb"xref\s+0 (\d+)\r?\n")
-_LINE = 20  # bytes of an entry of the table of places
 _PRINTED = 4  # flag of an annotation
 
 
@@ -32,14 +31,13 @@ def with_signature_field(pdf, name):
         The same file with an update behind it; the same bytes for the same file.
     """
     at = pdf.find(LINK)
-    table = _table_of(pdf)
-    if at < 0 or table is None:
+    objects = objects_of(pdf)
+    if at < 0 or objects is None:
         return pdf
-    places, trailer = table
-    annotation = _object_around(pdf, at, places)
-    tag = annotation and _object_around(pdf, pdf.find(b"/Obj %d 0 R" % annotation[0]), places)
-    root = re.search(rb"/Root (\d+) 0 R", trailer)
-    catalog = root and _object_at(pdf, int(root[1]), places)
+    annotation = objects.around(at)
+    tag = annotation and objects.around(pdf.find(b"/Obj %d 0 R" % annotation[0]))
+    root = re.search(rb"/Root (\d+) 0 R", objects.trailer)
+    catalog = root and objects.content(int(root[1]))
     parts = _parts(annotation, tag)
     if parts is None or catalog is None or b"/AcroForm" in catalog:
         return pdf
@@ -48,9 +46,9 @@ def with_signature_field(pdf, name):
         int(root[1]): catalog[: catalog.rindex(b">>")]
         + b"/AcroForm<</Fields[%d 0 R]/SigFlags 1>>>>" % annotation[0],
     }
-    appearance = len(places)
+    appearance = len(objects.places)
     changed[annotation[0]], changed[appearance] = _field(name, parts, appearance)
-    return pdf + _update(pdf, changed, trailer)
+    return pdf + _update(objects, changed)
 
 
 def _field(name, parts, appearance):
@@ -64,37 +62,6 @@ def _field(name, parts, appearance):
     )
     form = b"<</Type/XObject/Subtype/Form/BBox[0 0 %g %g]/Resources<<>>/Length 0>>"
     return widget, form % (right - left, top - bottom) + b"\nstream\n\nendstream"
-
-
-def _table_of(pdf):
-    """Places of the objects by their numbers, and the trailer; None for a file of another form."""
-    found = _START.search(pdf[-64:])
-    head = found and _TABLE.match(pdf, int(found[1]))
-    if not head:
-        return None
-    first, count = head.end(), int(head[1])
-    lines = pdf[first : first + _LINE * count]
-    places = [int(lines[_LINE * i : _LINE * i + 10]) for i in range(count)]
-    return places, pdf[first + _LINE * count :]
-
-
-def _object_around(pdf, at, places):
-    """(number, content) of the object that a place of the file is in; None for no place."""
-    if at < 0:
-        return None
-    head = pdf.rfind(b" 0 obj", 0, at)
-    number = int(pdf[pdf.rfind(b"\n", 0, head) + 1 : head])
-    content = _object_at(pdf, number, places)
-    return content and (number, content)
-
-
-def _object_at(pdf, number, places):
-    """The content of an object between `obj` and `endobj`; None where it is not at its place."""
-    head = b"%d 0 obj\n" % number
-    start = places[number]
-    if not pdf.startswith(head, start):
-        return None
-    return pdf[start + len(head) : pdf.index(b"\nendobj", start)]
 
 
 def _parts(annotation, tag):
@@ -114,17 +81,16 @@ def _text(words):
     return b"<FEFF%s>" % words.encode("utf-16-be").hex().upper().encode()
 
 
-def _update(pdf, changed, trailer):
+def _update(objects, changed):
     """What is put behind a file so that the objects `changed` {number: content} are so."""
-    written, places = bytearray(b"\n"), {}
+    pdf, trailer, written, places = objects.pdf, objects.trailer, bytearray(b"\n"), {}
     for number, content in sorted(changed.items()):
         places[number] = len(pdf) + len(written)
-        written += b"%d 0 obj\n%s\nendobj\n" % (number, content)
+        written += b"%s%s\nendobj\n" % (head_of(number), content)
     start = len(pdf) + len(written)
     written += b"xref\n0 1\n0000000000 65535 f\r\n"
     for number, place in places.items():
         written += b"%d 1\n%010d 00000 n\r\n" % (number, place)
-    previous = int(_START.search(pdf[-64:])[1])
     keys = [re.search(rb"/(?:Root|Info) \d+ 0 R", trailer[i:])[0] for i in
             (trailer.index(b"/Root"), trailer.index(b"/Info"))]  # fmt: skip
     first = re.search(rb"/ID\[(\([^()]*\))", trailer)
@@ -133,6 +99,6 @@ def _update(pdf, changed, trailer):
         second = hashlib.sha256(bytes(written)).hexdigest()[:32].encode()
         identity = b"/ID[%s<%s>]" % (first[1], second)
     written += b"trailer\n<</Size %d%s%s/Prev %d>>\nstartxref\n%d\n%%%%EOF" % (
-        max(changed) + 1, b"".join(keys), identity, previous, start,
+        max(changed) + 1, b"".join(keys), identity, objects.table, start,
     )  # fmt: skip
     return bytes(written)

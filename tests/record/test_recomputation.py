@@ -9,6 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tankcal.cli import verifying
+from tankcal.record.covariance_factor import blocks_of
+from tankcal.record.plain_data import to_plain
 from tankcal.record.recomputation import compare_records
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -27,9 +30,10 @@ def record(factor, volumes=(0.0, 40.0, 500.0), drawn=0.0):
         "tankcal": "0.1.0",
         "versions": {"python": "3", "numpy": "2", "scipy": "1"},
         "capacity": {
+            "height_m": [0.0, 1.0, 2.0],
             "volume_m3": list(volumes),
             "inputs": inputs,
-            "factor_m3": np.asarray(factor).tolist(),
+            "factor": to_plain(blocks_of(factor)),
         },
         "monte_carlo": {"se_value": [drawn, 0.0]},
         "budgets": [{"monte_carlo": {"d_low": drawn}}],
@@ -86,3 +90,14 @@ def test_another_machine_agrees(example, tmp_path):
         records.append(json.loads(path.read_text(encoding="utf-8")))
     found = compare_records(*records)
     assert (found.beyond, found.otherwise) == ((), ())
+
+
+def test_other_last_digits_are_told_as_rounding():
+    """Numbers that are not the same, none of them by more than can be written."""
+    found = compare_records(record(F), record(np.nextafter(F, 1.0)))
+    assert found.agrees
+    assert found.different
+    assert found.largest is None
+    (told, _) = verifying._numbers(found)
+    assert told.code == "verify_rounded_numbers"
+    assert f"{found.different} not the same bit for bit" in told

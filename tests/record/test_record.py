@@ -10,6 +10,7 @@ import tankcal
 from tankcal import record as records
 from tankcal.errors import InputError
 from tankcal.record import load, record_of, save
+from tankcal.record.covariance_factor import factor_of
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +49,7 @@ def test_foreign_file_is_refused_as_record(text, tmp_path):
 def test_rows_of_the_table_equal_the_result(record, example_result):
     table = record["capacity"]
     assert table["volume_m3"] == list(example_result.table.volume_m3)
-    factor = np.array(table["factor_m3"])
+    factor = factor_of(table)
     assert factor.shape == (len(table["height_m"]), len(table["inputs"]))
     assert np.sqrt(np.sum(factor**2, axis=1)) == pytest.approx(table["u_m3"], rel=1e-12)
     assert np.array(table["k"]) * table["u_m3"] == pytest.approx(table["U_m3"], rel=1e-12)

@@ -21,6 +21,7 @@ from tankcal.gum.distributions import NAMES
 from tankcal.job.contract.uncertainty import INPUTS
 from tankcal.pipeline import plot_style
 from tankcal.record import record_of, save
+from tankcal.record.covariance_factor import blocks_of
 from tankcal.record.plain_data import to_plain
 from tankcal.record.statements import budgets_of
 from tankcal.report import figures
@@ -366,7 +367,8 @@ def test_numbers_between_powers_of_ten_have_decimal_mark(record):
     capacity = other["capacity"]
     capacity["volume_m3"] = list(np.linspace(1000, 1001, len(capacity["volume_m3"])))
     capacity["u_m3"] = list(np.linspace(1, 3, len(capacity["u_m3"])))
-    capacity["factor_m3"] = [[volume / 1e3] for volume in capacity["volume_m3"]]
+    capacity["inputs"] = capacity["inputs"][:1]
+    capacity["factor"] = to_plain(blocks_of([[one / 1e3] for one in capacity["volume_m3"]]))
     other["deliveries"] = []
     spanish = Paper(other, language="es")
     svg = spanish.figure(drawn.delivery_curve(spanish), "delivery_curve").data["svg"]

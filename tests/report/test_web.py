@@ -14,6 +14,7 @@ from paper_cells import paper_blocks
 
 import tankcal
 from tankcal.record import record_of, save
+from tankcal.record.covariance_factor import factor_of
 from tankcal.report import blocks
 from tankcal.report.document import blocks_of
 from tankcal.report.exporter import HtmlExporter
@@ -135,7 +136,7 @@ def test_the_data_are_those_of_the_record(example_record, found):
 def test_few_rows_of_factor_represent_all(example_record, found, figure):
     """Second method: the factor between the kept rows against every row of the record."""
     capacity = json.loads(example_record.read_text())["capacity"]
-    factor, height = np.array(capacity["factor_m3"]), np.array(capacity["height_m"])
+    factor, height = factor_of(capacity), np.array(capacity["height_m"])
     data = block_of(found, "calculator")["deliveries"]
     rows = numbers(data["rows"], "<u4")
     kept = numbers(data["factor"], "<f4").reshape(len(rows), -1)
@@ -172,7 +173,7 @@ def test_degrees_of_freedom_are_those_of_the_deliveries(example_record):
     record = json.loads(example_record.read_text())
     capacity = record["capacity"]
     owner, dof = sources_of(record)
-    factor = np.array(capacity["factor_m3"])
+    factor = factor_of(capacity)
     for one in record["deliveries"]:
         low, high = (
             [np.interp(one["absolute"][key], capacity["height_m"], column) for column in factor.T]

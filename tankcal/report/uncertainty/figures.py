@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 
 from tankcal.pipeline.plot_style import FAINT, INK, RED, WIDTH, set_margins, styled
+from tankcal.record.covariance_factor import factor_of
 
 _SHORT_AXIS = 20  # from its lowest number to its highest: beyond, powers of ten are enough
 _MOST = 98  # per cent of the differences that the frame holds at least
@@ -20,7 +21,7 @@ def delivery_curve(paper):
     height_m, volume_m3, u_m3 = (
         np.array(capacity[key]) for key in ("height_m", "volume_m3", "u_m3")
     )
-    factor = np.array(capacity["factor_m3"])
+    factor = factor_of(capacity)
     delivered = {
         "height": height_m[-1] - height_m[:-1],
         "volume": volume_m3[-1] - volume_m3[:-1],

@@ -6,6 +6,7 @@ of a long table is nearly straight between few of its rows: only those are kept.
 
 import numpy as np
 
+from tankcal.record.covariance_factor import factor_of
 from tankcal.report.blocks import Block
 from tankcal.report.numbers import unit
 from tankcal.report.uncertainty.sources import critical_zone, groups_of
@@ -49,8 +50,7 @@ def calculator(paper):
 def _deliveries(record, unit_factor):
     """The factor at its kept rows, its sources, k by degrees of freedom, and what is stated."""
     capacity = record["capacity"]
-    factor = np.array(capacity["factor_m3"], dtype=float).reshape(len(capacity["height_m"]), -1)
-    factor *= unit_factor
+    factor = factor_of(capacity) * unit_factor
     height_m = np.array(capacity["height_m"])
     largest = np.linalg.norm(factor, axis=1).max(initial=0.0)
     rows = straight_rows(height_m, factor, BEND * largest)

@@ -31,7 +31,7 @@ def differences(table, names):
     names  of the columns, as the sheet of the factor has them
     """
     lines = []
-    for column, (name, value) in enumerate(zip(names, table.differences(), strict=True), start=1):
+    for column, (name, value) in enumerate(zip(names, table.differences, strict=True), start=1):
         low, high = (_at(dip, column) for dip in ("low_dip", "high_dip"))
         formula = f"IF([delivery_state]=#delivery,{high}-{low},{_NONE})"
         lines.append(Line(f"column_{column}", formula, _if(table, value), 6, "m³", label=name))
@@ -59,7 +59,7 @@ def combining(table, label):
     label  function of a `Group` that names the line of its variance
     """
     groups = [group for group in table.groups() if math.isfinite(group.dof)]
-    squares = [value**2 for value in table.differences()]
+    squares = [value**2 for value in table.differences]
     variances = [sum(squares[group.first : group.last + 1]) for group in groups]
     lines, shares = [], []
     for place, (group, variance) in enumerate(zip(groups, variances, strict=True), start=1):

@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+from tankcal.record.covariance_factor import factor_of
 from tankcal.report.workbook.look import Column, height_digits
 from tankcal.text.words import name_of_input
 
@@ -30,9 +31,9 @@ def factor_sheet(book, record):
         return
     heights = capacity["height_m"]
     columns = [Column(_dip(book), heights, height_digits(heights), 12)]
-    by_column = zip(*capacity["factor_m3"], strict=True)
+    by_column = factor_of(capacity).T
     columns += [
-        Column(name, cells, _DIGITS, _WIDTH)
+        Column(name, cells.tolist(), _DIGITS, _WIDTH)
         for name, cells in zip(column_names(book, capacity), by_column, strict=True)
     ]
     sheet = book.plain_sheet("covariance_factor", columns, landscape=True)

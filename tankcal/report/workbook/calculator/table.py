@@ -1,8 +1,10 @@
 """What the calculator needs of a record, and the dips that it opens with."""
 
 import math
+from functools import cached_property
 from itertools import pairwise
 
+from tankcal.record.covariance_factor import factor_of
 from tankcal.report.uncertainty.sources import critical_zone, groups_of
 from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
 from tankcal.report.workbook.capacity import digits_of_heights
@@ -50,10 +52,11 @@ class Table:
         """`Group`s of the columns of the factor, in their order."""
         return groups_of(self.capacity["input_kind"], self.record["budget"])
 
+    @cached_property
     def differences(self):
         """f(at) - f(low), column by column: what does not cancel in the first delivery."""
-        factor = self.capacity["factor_m3"]
-        return [high - low for low, high in zip(factor[self.low], factor[self.at], strict=True)]
+        factor = factor_of(self.capacity)
+        return (factor[self.at] - factor[self.low]).tolist()
 
     def coverage(self, dof):
         """(k of infinite, k of `dof`) degrees of freedom, at the probability of the job."""
