@@ -1,7 +1,6 @@
 """Warnings of bare wall hits: what a sound crew with a sound instrument hardly brings home."""
 
 import numpy as np
-from scipy.special import ndtri
 
 from tankcal.errors import Problem
 from tankcal.geometry.outlines import FULL_TURN
@@ -21,14 +20,13 @@ from tankcal.pipeline.moved_setups import (
     moved_or_ranged,
     worst_setup,
 )
-from tankcal.pipeline.survey_limits import limit_at, limits_of
+from tankcal.pipeline.survey_limits import limit_at, limits_of, repeat_factor
 from tankcal.pipeline.wall import joints_of
 from tankcal.survey.control_drift import repeats_of
 from tankcal.survey.sighting import NETWORK
 
 RULES, CONTROL = "wall_hits", "control_readings.csv"
 UNLIKE_SDS = 3.0  # of an offset or a scale from its certificate
-BY_CHANCE = 0.01  # of sound surveys whose control targets seem to move by their readings' scatter
 OVER_JOINT_M = 0.02  # a hit of a course may lie so far beyond it
 SUSPECT = 3.0  # test quantity of the worst set-up, from which it is tested by all others
 WAVE_M = 3e-3  # sd of each long wave of a wall, when a set-up is tested
@@ -68,7 +66,7 @@ def _of_control(job):
         yield Problem(CONTROL, text)
         return
     again = repeats_of(job.hits.control)
-    factor = np.sqrt(2) * -ndtri(BY_CHANCE / 2 / sum(3 * len(one.rows) for one in again))
+    factor = repeat_factor(sum(3 * len(one.rows) for one in again))
     for one in again:
         of_distances, of_angles = (factor * sd for sd in _sds_of(job.hits, one.setup))
         angle = max(limits["control_angle_gon"] * GON, of_angles)

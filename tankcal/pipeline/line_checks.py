@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.special import ndtri
 
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.line_departures import check_lines_apart, check_scale, check_sign
-from tankcal.pipeline.survey_limits import limit_at, limits_of
+from tankcal.pipeline.survey_limits import limit_at, limits_of, repeat_factor
 from tankcal.survey.reference_line import (
     ARCSEC,
     collimation_by_faces,
@@ -23,7 +22,6 @@ UNLIKE_SDS = 3.0  # of a collimation, from what its certificate says
 OFF_AXIS_M, OFF_AXIS_SDS = 0.01, 6.0  # of a level's centre, from the straight axis
 OFF_LEVEL_M = 0.003  # of a strap's radius, from the levels of its course
 SCALE_OF_MEDIAN = 1.4826
-BY_CHANCE = 0.01  # of sound surveys whose lines seem to have moved by their readings' scatter
 WRITTEN_M = 5e-5  # half the last digit that is said of a difference
 CRITICAL_LEAN = 3.72  # of two slopes together: a chi-square of two exceeds it in 0.1 %
 VERTICALS = 1e-4  # m/m: how alike the verticals of a plummet and of the points are, 20"
@@ -200,8 +198,7 @@ def _moved(job):
     for one in job.lines.offsets:
         if one.reference:
             seen.setdefault((one.line, one.face), []).append(one)
-    again = max(sum(len(one) - 1 for one in seen.values()), 1)
-    factor = np.sqrt(2) * -ndtri(BY_CHANCE / 2 / again)
+    factor = repeat_factor(max(sum(len(one) - 1 for one in seen.values()), 1))
     for (line, _), several in seen.items():
         found = [one.offset_m for one in several]
         limit = limits_of(RULES)["reference_repeats_mm"] / 1000
