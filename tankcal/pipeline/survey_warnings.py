@@ -17,6 +17,7 @@ SHOWN = 5  # names in a message
 CERTIFICATE_NEEDS = ("number", "laboratory", "customer", "method")
 LARGE_NOISE_M, LARGE_JUMP_M, MANY_SNOOPED = 0.010, 0.020, 0.03
 CONFIRMED = 0.5  # scatter over given sds, or the other way round, from which on they agree
+ONE_HEIGHT, OFF_MIDDLE = 0.2, 0.1  # of a course's height: points no taller, and no nearer to it
 VAGUE = 5.0  # times the median sd: what a point with one poor ray too few has
 OF_VERTICAL = message(
     "gives_vertical",
@@ -234,6 +235,31 @@ def weak_sections(job, groups, azimuth_rad):
                 )
             )
     return _problems(job.points, texts)
+
+
+def warn_of_taper(job, sites):
+    """Courses that were measured at one height each, all off their middles to the same side.
+
+    A taper that all courses share, as lapped plates have it, moves the table then, and U knows only
+    of tapers that each course has by itself.
+    """
+    if any(one.name == "taper" for one in job.inputs):
+        return []
+    parts = [(sites.zeta[members] + 1) / 2 for members in sites.members if len(members)]
+    flat = [np.ptp(part) < ONE_HEIGHT for part in parts]
+    off = np.mean([np.median(part) for part in parts]) - 0.5
+    if np.mean(flat) <= 0.5 or abs(off) < OFF_MIDDLE:
+        return []
+    text = message(
+        "taper_unseen",
+        "{count} of {all} courses were measured at one height, in the mean {percent:+.0f} % of a"
+        " course's height from the middle: a taper that all courses share would move the table, and"
+        " U has none of it; measure a second height, or declare taper in uncertainty.csv",
+        count=sum(flat),
+        all=len(parts),
+        percent=100 * off,
+    )
+    return _problems(job.points, [text])
 
 
 def check_shell(job, shell, sections, given_sd_m):

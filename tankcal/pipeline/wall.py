@@ -24,6 +24,7 @@ from tankcal.pipeline.survey_warnings import (
     check_shell,
     noise_is_estimated,
     origin_of,
+    warn_of_taper,
     warn_of_vague_points,
     warn_of_vague_vertical,
     weak_sections,
@@ -330,6 +331,7 @@ def warnings_of(job, wall):
     sds = radial_sds(job.points)
     return (
         *weak_sections(job, groups, _azimuths(job, wall.shell, wall.accepted)),
+        *warn_of_taper(job, wall.field.sites),
         *check_shell(job, wall.shell, wall.sections, sds),
         *warn_of_vague_points(job.points, wall.accepted, sds, wall.shell.noise_m),
         *warn_of_vague_vertical(job.points),
