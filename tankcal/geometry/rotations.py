@@ -137,8 +137,8 @@ def apply_small_rotation(rotation, small_rad):
     half = 0.5 * np.sqrt(np.einsum("ni,ni->n", d, d))
     half = np.maximum(half, 1e-30)[:, None, None]
     first, second = np.sin(2 * half) / (2 * half), 0.5 * (np.sin(half) / half) ** 2
-    turned = cross @ rotation
-    return rotation + first * turned + second * (cross @ turned)
+    turned_by = first * cross + second * (cross @ cross)
+    return rotation + turned_by @ rotation
 
 
 def rotation_vector(rotation):
