@@ -20,12 +20,12 @@ COMPILED = (
     "_spread",
     "_pack",
     "_square",
+    "_add_square",
     "_product",
     "_add_squares",
     "_add_blocks",
     "_root",
     "_forward",
-    "_leave",
     "_sizes",
     "_eliminate",
     "_back",
@@ -54,12 +54,8 @@ def _add_squares(w, jac, skip, first, cuts, t, g):
         while end < n and _is_alike(first, end, begin):
             end += 1
         at, own = m * begin * width + skip, first[begin]
-        for low in range(0, k, PANEL):
-            high = min(low + PANEL, k)
-            for left in range(low, k, WIDE):
-                right = min(left + WIDE, k)
-                _square(flat, at, width, m * (end - begin), low, high, left, right, pack, square)
-                _spread(1.0, own, cuts, low, high, left, right, square, flat_t, len(g))
+        rows = m * (end - begin)
+        _add_square(1.0, flat, at, width, rows, own, cuts, pack, square, flat_t, len(g))
         _product(flat, at, width, errors[m * begin : m * end], product)
         for one in range(runs):
             to = first[begin, one] - cuts[one]
@@ -72,6 +68,22 @@ def _is_alike(first, i, j):
     for run in range(first.shape[1]):
         alike = alike and first[i, run] == first[j, run]
     return alike
+
+
+def _add_square(sign, flat, at, width, rows, first, cuts, pack, square, flat_t, width_t):
+    """Add Y'Y, its upper half, to the places of its columns in t, or take it from there.
+
+    sign   1 or -1
+    flat   numbers of which Y (rows, n) begins at `at`, each row width after the one before
+    first  (s,) place of the first column of each run, cuts (s + 1,) where the runs begin, n last
+    """
+    n = cuts[-1]
+    for low in range(0, n, PANEL):
+        high = min(low + PANEL, n)
+        for left in range(low, n, WIDE):
+            right = min(left + WIDE, n)
+            _square(flat, at, width, rows, low, high, left, right, pack, square)
+            _spread(sign, first, cuts, low, high, left, right, square, flat_t, width_t)
 
 
 def _spread(sign, first, cuts, low, high, left, right, square, flat, width):
@@ -225,20 +237,6 @@ def _forward(v, b, o, wide, first, n, right):
         right[a] += y0 * b0 + y1 * b1 + y2 * b2
 
 
-def _leave(flat, width, columns, cuts, at, wide, rows, pack, square):
-    """Take Y'Y, its upper half, from the places of its columns in t; Y (rows, n) begins at `at`.
-
-    columns (s,) the first of each run of them, cuts (s + 1,) where the runs begin, n at the end
-    """
-    n = cuts[-1]
-    for low in range(0, n, PANEL):
-        high = min(low + PANEL, n)
-        for left in range(low, n, WIDE):
-            right = min(left + WIDE, n)
-            _square(wide, at, n, rows, low, high, left, right, pack, square)
-            _spread(-1.0, columns, cuts, low, high, left, right, square, flat, width)
-
-
 def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, smallest):
     """Returns the number of the first block that is not determined, or -1.
 
@@ -262,9 +260,8 @@ def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, sm
         for run in range(len(edges)):
             cuts[run] = edges[run] - first
         own, at = heads[: len(edges) - 1], cuts[: len(edges)]
-        _leave(
-            flat, len(g), own, at, 3 * first, wide, 3 * (end - begin), pack, square
-        )  # fmt: skip
+        rows = 3 * (end - begin)
+        _add_square(-1.0, wide, 3 * first, n, rows, own, at, pack, square, flat, len(g))
         for a in range(n):
             g[columns[first + a]] -= right[a]
     return -1
