@@ -17,7 +17,7 @@ SHOWN = 5  # names in a message
 CERTIFICATE_NEEDS = ("number", "laboratory", "customer", "method")
 LARGE_NOISE_M, LARGE_JUMP_M, MANY_SNOOPED = 0.010, 0.020, 0.03
 CONFIRMED = 0.5  # scatter over given sds, or the other way round, from which on they agree
-ONE_HEIGHT, OFF_MIDDLE = 0.2, 0.1  # of a course's height: points no taller, and no nearer to it
+ONE_HEIGHT, OFF_MIDDLE = 0.2, 0.1  # of a course's height: within one height; off its middle
 VAGUE = 5.0  # times the median sd: what a point with one poor ray too few has
 OF_VERTICAL = message(
     "gives_vertical",

@@ -222,7 +222,7 @@ def _uncertainty(rows, declared, log):
 
 def _of_record(path, record, declared, log):
     """FormerTable of a record; what is declared beside it must not contradict it."""
-    _refuse_unequal(record["capacity"], path, log)
+    factor_m3 = _factor_of(record["capacity"], path, log)
     table, job = record["capacity"], record["job"]
     certificate, choices = job.get("certificate") or {}, _choices(record)
     density = choices.get("head", job["table"].get("liquid_density_kg_m3"))
@@ -266,14 +266,14 @@ def _of_record(path, record, declared, log):
         k=float(np.median(table["k"])),
         common=declared["common"],
         roof=_roof_of(record) or declared.roof,
-        factor_m3=factor_of(table),
+        factor_m3=factor_m3,
         record=record,
         **values,
     )
 
 
-def _refuse_unequal(table, path, log):
-    """InputError for columns of a record's table that are not as long as its heights."""
+def _factor_of(table, path, log):
+    """The factor of a record's table; InputError where columns are not as long as its heights."""
     rows = len(table["height_m"])
     lengths = {name: len(table[name]) for name in COLUMNS}
     lengths["factor"] = sum(block["rows"] for block in table["factor"])
@@ -287,14 +287,16 @@ def _refuse_unequal(table, path, log):
             )
             log.problem(path.name, expected, column=f"capacity.{name}")
     log.stop_if_problems()
+    factor_m3 = None
     try:
-        factor_of(table)
+        factor_m3 = factor_of(table)
     except ValueError:
         expected = message(
             "former_unequal_rows", "found rows of different length; expected as many values in each"
         )
         log.problem(path.name, expected, column="capacity.factor")
     log.stop_if_problems()
+    return factor_m3
 
 
 def _choices(record):
