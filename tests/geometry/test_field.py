@@ -267,9 +267,10 @@ def test_what_is_not_seen_by_nobody_is_the_prior():
     """One ring in the middle: the bulge of a course is as it was beforehand (closed form)."""
     sites = sites_of(1, [0.0], 24)
     field = field_of(sites, np.full(24, RADIUS_M))
-    taper = [one.name for one in COMPONENTS].index("taper")
-    unseen = field.means.unseen(taper)
-    size = field.amplitudes.variances_m2[taper]
+    names = [one.name for one in COMPONENTS]
+    tapers = [names.index(name) for name in ("common taper", "own taper")]
+    unseen = sum(field.means.unseen(index) for index in tapers)
+    size = field.amplitudes.variances_m2[tapers].sum()
     assert unseen == pytest.approx(3 * size * np.outer(gauss_heights(), gauss_heights()), abs=1e-12)
 
 

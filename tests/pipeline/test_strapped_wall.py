@@ -113,10 +113,11 @@ def test_the_radius_of_a_course_is_the_best_linear_estimate(tmp_path):
     z = sites.zeta
     same = np.equal.outer(sites.course, sites.course)
     node, weight = np.polynomial.legendre.leggauss(400)
-    names = ["common bulge", "drawn-in joints", "own bulge", "taper"]
+    names = ["common bulge", "drawn-in joints", "own bulge", "common taper", "own taper"]
     profiles = {
         "own bulge": (range(2, 7), [k**-2.0 for k in range(2, 7)]),
-        "taper": ((1,), (1.0,)),
+        "common taper": ((1,), (1.0,)),
+        "own taper": ((1,), (1.0,)),
     }
     whole = wall.field.noise_m2 + 1e-12 * np.eye(len(z))
     for place, name in enumerate(names):
@@ -136,7 +137,7 @@ def test_the_radius_of_a_course_is_the_best_linear_estimate(tmp_path):
             unit = [np.polynomial.legendre.Legendre.basis(k) for k in orders]
             norm = sum(s / (2 * k + 1) for k, s in zip(orders, shares, strict=True))
             part = sum(s * np.outer(p(z), p(z)) for s, p in zip(shares, unit, strict=True)) / norm
-        whole += size[place] * (part * same if name in ("own bulge", "taper") else part)
+        whole += size[place] * (part * same if name.startswith("own") else part)
     design = np.equal.outer(sites.course, range(5)).astype(float)
     inverse = np.linalg.inv(whole)
     found = np.linalg.solve(design.T @ inverse @ design, design.T @ inverse @ wall.field.radius_m)
