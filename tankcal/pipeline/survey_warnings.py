@@ -1,23 +1,17 @@
 """Warnings: what a sound survey of a sound tank hardly has. None of them stops a job."""
 
-from itertools import pairwise
-
 import numpy as np
 
 from tankcal.errors import Problem, SolutionError
 from tankcal.geometry.shell import VAGUE_TILT
 from tankcal.job.plausibility import VOLUME_MISS
 from tankcal.messages import list_some, message
-from tankcal.pipeline.undecided_columns import tell_undecided
 from tankcal.tank.body import OWN_SCALE
 
-FEWEST_POINTS, ADVISED_POINTS = 5, 10  # of a section
-WIDE_GAP_DEG = 45
 SHOWN = 5  # names in a message
 CERTIFICATE_NEEDS = ("number", "laboratory", "customer", "method")
-LARGE_NOISE_M, LARGE_JUMP_M, MANY_SNOOPED = 0.010, 0.020, 0.03
+LARGE_NOISE_M = 0.010
 CONFIRMED = 0.5  # scatter over given sds, or the other way round, from which on they agree
-ONE_HEIGHT, OFF_MIDDLE = 0.2, 0.1  # of a course's height: within one height; off its middle
 VAGUE = 5.0  # times the median sd: what a point with one poor ray too few has
 OF_VERTICAL = message(
     "gives_vertical",
@@ -151,7 +145,7 @@ def warn_of_vague_vertical(points):
         sd_mm_per_m=1000 * sd,
         remedy=OF_VERTICAL,
     )
-    return _problems(points, [text])
+    return of_points(points, [text])
 
 
 def warn_of_vague_points(points, accepted, sds_m, noise_m):
@@ -191,118 +185,11 @@ def warn_of_vague_points(points, accepted, sds_m, noise_m):
                 sd_mm=1000 * middle,
             )
         )
-    return _problems(points, texts)
+    return of_points(points, texts)
 
 
 def _with_sd(name, sd_m):
     return message("with_sd", "{name} ({sd_mm:.1f} mm)", name=name, sd_mm=1000 * sd_m)
-
-
-def _shown(job, group):
-    """Name of a section; of tangents, which have that of their course and level, the level."""
-    level = group.name.removeprefix(f"{job.courses[group.course].name} ")
-    if job.tangents is None or level == group.name:
-        return group.name
-    return message("section_at_level", "at {level_m:.3f} m", level_m=float(level))
-
-
-def weak_sections(job, groups, azimuth_rad):
-    """Sections with few points, or with a part of the turn that nobody measured."""
-    texts = []
-    for group in groups:
-        ordered = np.sort(azimuth_rad[group.members])
-        gap = np.degrees(np.max(np.diff(ordered, append=ordered[0] + 2 * np.pi)))
-        named = {"section": _shown(job, group), "course": job.courses[group.course].name}
-        if len(ordered) < ADVISED_POINTS:
-            texts.append(
-                message(
-                    "section_weak",
-                    "section {section} (course {course}) has only {count} points; {advised} "
-                    "or more are advised",
-                    **named,
-                    count=len(ordered),
-                    advised=ADVISED_POINTS,
-                )
-            )
-        if gap > WIDE_GAP_DEG:
-            texts.append(
-                message(
-                    "section_gap",
-                    "section {section} (course {course}) has no point over {gap_deg:.0f} deg "
-                    "of its circumference: measure there",
-                    **named,
-                    gap_deg=gap,
-                )
-            )
-    return _problems(job.points, texts)
-
-
-def warn_of_taper(job, sites):
-    """Courses that were measured at one height each, all off their middles to the same side.
-
-    A taper that all courses share, as lapped plates have it, moves the table then, and U knows only
-    of tapers that each course has by itself.
-    """
-    if any(one.name == "taper" for one in job.inputs):
-        return []
-    parts = [(sites.zeta[members] + 1) / 2 for members in sites.members if len(members)]
-    flat = [np.ptp(part) < ONE_HEIGHT for part in parts]
-    off = np.mean([np.median(part) for part in parts]) - 0.5
-    if np.mean(flat) <= 0.5 or abs(off) < OFF_MIDDLE:
-        return []
-    text = message(
-        "taper_unseen",
-        "{count} of {all} courses were measured at one height, in the mean {percent:+.0f} % of a"
-        " course's height from the middle: a taper that all courses share would move the table, and"
-        " U has none of it; measure a second height, or declare taper in uncertainty.csv",
-        count=sum(flat),
-        all=len(parts),
-        percent=100 * off,
-    )
-    return _problems(job.points, [text])
-
-
-def check_shell(job, shell, sections, given_sd_m):
-    """A tilt that is not determined, large scatter, many outliers, radii that jump.
-
-    given_sd_m (n,) standard deviations of the points in plan, or None. Those of an adjustment are
-    tested there, by all its residuals: a wall whose courses differ proves nothing against them.
-    """
-    texts = _of_scatter(shell, None if job.points.from_adjustment else given_sd_m)
-    if not shell.tilt_known:
-        texts.append(
-            message(
-                "tilt_unknown", "the points do not determine a tilt: the shell is taken as upright"
-            )
-        )
-    snooped = np.sum(shell.reason == "snooping")
-    tested = snooped + np.sum(shell.reason == "")
-    if snooped > max(MANY_SNOOPED * tested, 3):
-        texts.append(
-            message(
-                "many_outliers",
-                "{rejected} of {tested} points near the wall were rejected as outliers: are they "
-                "dents of the wall, or objects in front of it? The working papers list them",
-                rejected=snooped,
-                tested=tested,
-            )
-        )
-    texts += tell_undecided(job.points.names, shell, SHOWN)
-    for below, above in pairwise(sections):
-        plates = [job.courses[section.group.course].thickness_m for section in (below, above)]
-        jump = abs(above.circle.radius_m - below.circle.radius_m)
-        if jump > LARGE_JUMP_M + abs(plates[1] - plates[0]):
-            texts.append(
-                message(
-                    "radius_jumps",
-                    "the radius changes by {jump_mm:.0f} mm from section {below} to section"
-                    " {above}: is one of them not the wall?",
-                    jump_mm=1000 * jump,
-                    below=_shown(job, below.group),
-                    above=_shown(job, above.group),
-                )
-            )
-    return _problems(job.points, texts)
 
 
 def warn_of_undeclared(undeclared):
@@ -345,24 +232,5 @@ def against_nominal(tank, capacity_m3):
     return (Problem("job.toml", text, column="tank.nominal_volume_m3"),)
 
 
-def _of_scatter(shell, given_sd_m):
-    noise_mm = 1000 * shell.noise_m
-    if given_sd_m is not None:
-        given_mm = 1000 * np.median(given_sd_m)
-        if noise_mm > 2 * given_mm:
-            template = (
-                "the points scatter by {noise_mm:.1f} mm (sd) about the shell's form, their given"
-                " sd is {given_mm:.1f} mm: are the sds too small?"
-            )
-            return [message("sds_small", template, noise_mm=noise_mm, given_mm=given_mm)]
-    elif shell.noise_m > LARGE_NOISE_M:
-        template = (
-            "the points scatter by {noise_mm:.1f} mm (sd) about the shell's form: is there a second"
-            " surface (insulation, pipes) near the wall?"
-        )
-        return [message("points_scatter", template, noise_mm=noise_mm)]
-    return []
-
-
-def _problems(points, texts):
+def of_points(points, texts):
     return [Problem(origin_of(points), text) for text in texts]

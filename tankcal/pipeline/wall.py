@@ -19,15 +19,10 @@ from tankcal.pipeline.overruled_points import decisions_of, refuse_kept
 from tankcal.pipeline.point_covariance import given_covariance, median_sd, radial_sds
 from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.survey_warnings import (
-    ADVISED_POINTS,
-    FEWEST_POINTS,
-    check_shell,
     noise_is_estimated,
     origin_of,
-    warn_of_taper,
     warn_of_vague_points,
     warn_of_vague_vertical,
-    weak_sections,
 )
 from tankcal.pipeline.surveyed_wall import Wall
 from tankcal.pipeline.told_unknowns import told_unknowns, with_spread
@@ -35,6 +30,13 @@ from tankcal.pipeline.undecided_columns import undecided_halves
 from tankcal.pipeline.untied_setups import unbound_of
 from tankcal.pipeline.wall_readings import noise_by_inputs
 from tankcal.pipeline.wall_straps import PointsOfWall, join_readings, told_courses
+from tankcal.pipeline.wall_warnings import (
+    ADVISED_POINTS,
+    FEWEST_POINTS,
+    check_shell,
+    warn_of_taper,
+    weak_sections,
+)
 from tankcal.sections import (
     coordinates_of,
     covariance_of,
@@ -331,7 +333,7 @@ def warnings_of(job, wall):
     sds = radial_sds(job.points)
     return (
         *weak_sections(job, groups, _azimuths(job, wall.shell, wall.accepted)),
-        *warn_of_taper(job, wall.field.sites),
+        *warn_of_taper(job, wall.field),
         *check_shell(job, wall.shell, wall.sections, sds),
         *warn_of_vague_points(job.points, wall.accepted, sds, wall.shell.noise_m),
         *warn_of_vague_vertical(job.points),

@@ -1,4 +1,4 @@
-"""Courses that all taper alike, measured at one height each: what U does not have is told."""
+"""Courses that all taper alike, measured at one height each: in U, and told where it is more."""
 
 from dataclasses import replace
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from generated_walls import GeneratedWall, job_of, survey
 
+from tankcal.geometry.field.components import COMPONENTS
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall import find_wall, warnings_of
@@ -16,9 +17,13 @@ TAPER_M = 3e-3  # how much wider the top of each course is than its middle
 
 @pytest.fixture
 def wall():
+    return tapered(TAPER_M)
+
+
+def tapered(taper_m):
     wall = GeneratedWall(8.0, 6, 2.0)
     for course in range(6):
-        wall.add(course, np.ones_like, lambda zeta: TAPER_M * zeta)
+        wall.add(course, np.ones_like, lambda zeta: taper_m * zeta)
     return wall
 
 
@@ -69,3 +74,19 @@ def test_two_heights_and_a_declared_taper_are_not(wall, tmp_path):
     declared = replace(job, inputs=(DeclaredInput("taper", 3e-3, "mm", 3.0),))
     assert told(declared) == []
     assert miss(wall, declared) < 1
+
+
+@pytest.mark.parametrize("taper_m", [-2e-3, 2e-3])
+def test_a_taper_that_all_courses_share_is_in_u(taper_m, tmp_path):
+    """U does not average it out over the courses; tapers of each by itself were 1.07 U here."""
+    wall = tapered(taper_m)
+    assert abs(miss(wall, job_at(wall, tmp_path, 0.75))) < 1
+
+
+def test_what_u_has_of_it_is_told(wall, tmp_path):
+    job = job_at(wall, tmp_path, 0.75)
+    wall_found = find_wall(job, lambda text: None)
+    (text,) = [one.text for one in warnings_of(job, wall_found) if "taper" in one.text]
+    names = [one.name for one in COMPONENTS]
+    size_m2 = wall_found.field.amplitudes.variances_m2[names.index("common taper")]
+    assert f"{1000 * np.sqrt(3 * size_m2):.1f} mm" in text

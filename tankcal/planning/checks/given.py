@@ -3,7 +3,7 @@
 from tankcal.job.checking import is_not_given, refuse_repeated
 from tankcal.job.tables import nearest
 from tankcal.messages import message
-from tankcal.pipeline.survey_warnings import ADVISED_POINTS, FEWEST_POINTS
+from tankcal.pipeline.wall_warnings import ADVISED_POINTS, FEWEST_POINTS
 from tankcal.planning.fields import check_form, no_such_name
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.obstacles import check_obstacles
