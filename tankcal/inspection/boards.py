@@ -22,7 +22,7 @@ HOLE_M = 0.06  # between places of the wall near the weld; wider, and the peak m
 STEP_M, STEEP = 0.010, 0.4  # no wall rises so much from cell to cell, or is so steep
 BEAD_M = 0.02  # half the width of a bead
 BESIDE_M = 0.0375  # of the wall beside a bead, that is led on under it
-MISSED = 3.0  # over this: of a second difference, what the mean of a cell or a bridge may miss
+MISSED = 2.0  # over this: of a second difference, what the mean of a cell or a bridge may miss
 
 
 def board_gap(s_m, e_m, board_m=BOARD_M):
@@ -78,7 +78,8 @@ def gaps_of_profile(s_m, e_m, sd_m, *, board_m=BOARD_M, reach_m=REACH_M, has_bea
 
     The wall at an end of the board is that of a straight line through the cells beside it. What
     the mean of a cell misses of a form that bends within it is told by the departure of the cell
-    from its neighbours (less their noise): of a sharp ridge a third of it, of a smooth one less.
+    from its neighbours (less their noise): of a ridge in the middle of a cell a third of it, of one
+    between two cells all, of a smooth one a twelfth. Up to a half counts, each part as likely.
 
     Parameters
     ----------

@@ -250,7 +250,8 @@ def _gap_of_scene(scene, azimuth, z):
 
 
 @pytest.mark.slow
-def test_job_with_files_of_a_scanner(tmp_path):
+@pytest.mark.parametrize("seed", [3, 5])
+def test_job_with_files_of_a_scanner(tmp_path, seed):
     """Truth: the radius of the surface that the beams of `scanned_tanks` are followed to."""
 
     def form(azimuth, z):
@@ -258,7 +259,7 @@ def test_job_with_files_of_a_scanner(tmp_path):
         return 3.0 + 0.004 * np.sin(2 * azimuth) + 0.0005 * z + 0.008 * np.exp(-np.abs(s) / 0.2)
 
     surface = Surface(form, (0.4, -0.2))
-    parts = scanned_parts(np.random.default_rng(3), surface=surface, columns=2000, rows=160)
+    parts = scanned_parts(np.random.default_rng(seed), surface=surface, columns=2000, rows=160)
     rows = [[course, float(np.degrees(at))] for course in ("1", "2") for at in (1.0, 4.0)]
     parts.tables["welds"] = [["course", "azimuth_deg"], *rows]
     result = tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)), simulated=False)
