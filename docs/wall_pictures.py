@@ -21,7 +21,7 @@ def components():
     figure = Figure(figsize=(WIDTH, 2.3))
     left, right = figure.subplots(1, 2)
     zeta = np.linspace(-1, 1, 201)
-    shown = {"common bulge": (INK, 1), "drawn-in joints": (RED, -1), "taper": (FAINT, 1)}
+    shown = {"common bulge": (INK, 1), "drawn-in joints": (RED, -1), "own taper": (FAINT, 1)}
     for one in COMPONENTS:
         if one.name in shown:
             colour, sign = shown[one.name]
