@@ -24,6 +24,8 @@ from tankcal.job.plausibility import (
 from tankcal.messages import message
 from tankcal.pipeline.survey_warnings import origin_of
 
+NEAR_FOOT_M = 0.3  # of the dip's foot: as wide as a dent; what is farther off says little of it
+
 
 def refuse_misfit(points, noise_m, diameter_m):
     """Raise InputError for points that lie on no such shape: one axis in another unit, say.
@@ -72,7 +74,21 @@ def check_scan(job, scan, top_m):
                 given_mm=1000 * given,
             )
             problems.append(Problem(origin_of(job.points), text))
-    return [*problems, *_of_reference(job, top_m)]
+    return [*problems, *_of_foot(job, scan), *_of_reference(job, top_m)]
+
+
+def _of_foot(job, scan):
+    """A wall that nobody measured where the dip meets it: of the zero a dent there is all of U."""
+    if scan.foot_m is None or scan.foot_m <= NEAR_FOOT_M:
+        return []
+    text = message(
+        "dip_foot_unseen",
+        "the point nearest to where the dip meets the bottom is {away_m:.2f} m from it, and a dent"
+        " or a weld there moves the zero of the table: measure three points of the wall there,"
+        " 50 mm apart",
+        away_m=scan.foot_m,
+    )
+    return [Problem(origin_of(job.points), text)]
 
 
 def given_sd_m(points):

@@ -34,6 +34,8 @@ class Scan:
     accepted     (m,) indices of the points that were used
     residuals_m  (n,) of all points, outwards positive; noise_m their standard deviation
     fit          the sphere or cylinder; reach_m of the used points along the cylinder's axis
+    foot_m       distance of the nearest used point from where the dip meets the bottom of a
+                 cylinder
     """
 
     names: tuple[str, ...]
@@ -45,6 +47,7 @@ class Scan:
     noise_m: float
     fit: object
     reach_m: tuple[float, float] = (-np.inf, np.inf)
+    foot_m: float | None = None
     surveyed_as = "scan"
 
     def is_within(self, places_m):
@@ -95,6 +98,7 @@ def fit_scan(job, dof=np.inf):
         noise,
         fit,
         _reach(fit, job.points.xyz_m[chosen]),
+        wall.foot_m,
     )
 
 

@@ -58,11 +58,12 @@ class Fitted:
 
 @dataclass(frozen=True)
 class ScannedWall:
-    """values and factors of the sizes as `scan.Scan` has them; the form of the wall."""
+    """values and factors of the sizes as `scan.Scan` has them; the form of the wall; foot_m."""
 
     values: np.ndarray
     factors: tuple[Factor, ...]
     form: SurveyedForm
+    foot_m: float | None
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,8 @@ def scanned_wall(job, fitted, chosen, covariance_m2, dof):
         factors,
     )
     values = np.array(fitted.values) + fitted.by_shape @ found.moved + wider
-    return ScannedWall(values, of_points(own), form)
+    foot_m = _nearest_to_foot(job, fitted.fit, solid, job.points.xyz_m[chosen])
+    return ScannedWall(values, of_points(own), form, foot_m)
 
 
 def _field(readings, estimated):
@@ -217,6 +219,22 @@ def _on_cylinder(job, fit, xyz_m):
     return np.arctan2(d @ across, -(d @ up)), sign * (d @ fit.direction)
 
 
+def _dip_along(solid, along_m):
+    """Place of the dip along the axis; the middle of the cylinder is that of points (n,) there."""
+    return (along_m.min() + along_m.max() - solid.length_m) / 2 + solid.dip_from_a_m
+
+
+def _nearest_to_foot(job, fit, solid, xyz_m):
+    """How far from the place where the dip meets the bottom the nearest point is; of spheres None,
+    whose bottom is told by the wall about it.
+    """
+    if not isinstance(fit, FittedCylinder):
+        return None
+    turn, along = _on_cylinder(job, fit, xyz_m)
+    away = np.hypot(fit.radius_m * turn, along - _dip_along(solid, along))
+    return float(away.min())
+
+
 def _functionals(job, fitted, solid, places, levels_m, area_m2, chosen):
     """Of the volumes at the nodes, the sizes, and the wall at the top and at the bottom."""
     if not isinstance(fitted.fit, FittedCylinder):
@@ -224,9 +242,9 @@ def _functionals(job, fitted, solid, places, levels_m, area_m2, chosen):
         ends = np.array([(-1.0) ** DEGREES, np.ones(len(DEGREES))])
         return np.vstack([volumes, np.zeros((len(fitted.names), len(DEGREES))), ends])
     along = _on_cylinder(job, fitted.fit, job.points.xyz_m[chosen])[1]
-    begin = (along.min() + along.max() - solid.length_m) / 2
+    dip = _dip_along(solid, along)
+    begin = dip - solid.dip_from_a_m
     radius, cells, around = solid.width_m / 2, cells_along(begin, solid.length_m), cells_around()
-    dip = begin + solid.dip_from_a_m
     rise = np.hypot(1.0, solid.tilt) if solid.dip_direction == "plumb" else 1.0
     axis = rise * levels_m[:, None] - radius - solid.tilt * (cells - dip)
     cell = radius * FULL_TURN / len(around) * solid.length_m / len(cells)
