@@ -15,6 +15,7 @@ import numpy as np
 
 PANEL = 64  # columns whose products with those after them are taken at once; an even number
 WIDE = 264  # of those after them, at most, and no power of two: rows share no lines of the cache
+SIDE = 8  # columns that the processor multiplies side by side; WIDE is a multiple of it
 COMPILED = (
     "_is_alike",
     "_spread",
@@ -118,11 +119,13 @@ def _square(flat, first, width, rows, low, high, left, right, pack, out):
     The numbers of a row of Y begin at first, those of the next after width. left is low, or after
     high. Out gets WIDE numbers a row, and a row more. Six rows of Y are copied to pack and
     multiplied two columns at a time: what is read is used often, and as all distances are known
-    the compiler need not ask whether what it writes lies where it reads.
+    the compiler need not ask whether what it writes lies where it reads. It is done in whole groups
+    of SIDE columns: nobody reads what comes out left of the diagonal and right of the last one.
     """
     n, own = np.uintp(right - left), 0
+    whole = np.uintp((right - left + SIDE - 1) // SIDE * SIDE)
     for a in range(np.uintp(high - low)):
-        for q in range(n):
+        for q in range(whole):
             out[a * np.uintp(WIDE) + q] = 0.0
     for row in range(0, rows, 6):
         at = first + row * width
@@ -139,7 +142,7 @@ def _square(flat, first, width, rows, low, high, left, right, pack, out):
             a4, b4 = pack[i + np.uintp(4 * WIDE)], pack[i + np.uintp(4 * WIDE + 1)]
             a5, b5 = pack[i + np.uintp(5 * WIDE)], pack[i + np.uintp(5 * WIDE + 1)]
             to = np.uintp((a - low) * WIDE)
-            for q in range(np.uintp(max(a - left, 0)), n):
+            for q in range(np.uintp(max(a - left, 0) // SIDE * SIDE), whole):
                 q0, q1 = pack[q], pack[q + np.uintp(WIDE)]
                 q2, q3 = pack[q + np.uintp(2 * WIDE)], pack[q + np.uintp(3 * WIDE)]
                 q4, q5 = pack[q + np.uintp(4 * WIDE)], pack[q + np.uintp(5 * WIDE)]

@@ -115,9 +115,12 @@ def test_blocks_eliminated_together_give_what_they_give_one_by_one(monkeypatch):
         assert one == pytest.approx(other, abs=1e-11)
 
 
-@pytest.mark.parametrize(("panel", "wide"), [(2, 3), (loops.PANEL, loops.WIDE)])
+@pytest.mark.parametrize(
+    ("panel", "wide", "side"),
+    [(2, 3, 1), (2, 3, 3), (loops.PANEL, loops.WIDE, loops.SIDE)],
+)
 @pytest.mark.parametrize("m", [1, 2, 3, 7])
-def test_rows_added_by_loops_are_those_of_arrays(m, panel, wide, monkeypatch):
+def test_rows_added_by_loops_are_those_of_arrays(m, panel, wide, side, monkeypatch):
     """Neighbours with the same columns, in series of one row and of many; runs in any order."""
     rng, reduced, blocks = np.random.default_rng(23), 15, 12
     groups = groups_of(rng, reduced, blocks)
@@ -139,6 +142,7 @@ def test_rows_added_by_loops_are_those_of_arrays(m, panel, wide, monkeypatch):
     of_arrays = added()
     monkeypatch.setattr(loops, "PANEL", panel)
     monkeypatch.setattr(loops, "WIDE", wide)
+    monkeypatch.setattr(loops, "SIDE", side)
     monkeypatch.setattr(elimination, "is_worth_compiling", lambda rows=0: True)
     plain = SimpleNamespace(**{name: vars(loops)[name] for name in loops.COMPILED})
     monkeypatch.setattr(elimination, "compile_functions", lambda module, names: plain)
@@ -162,8 +166,11 @@ def among(plan, normals, unknowns):
     return elimination.through_reduced(plan, normals, unknowns), own
 
 
-@pytest.mark.parametrize(("panel", "wide"), [(4, 5), (loops.PANEL, loops.WIDE)])
-def test_elimination_by_loops_is_that_of_arrays(panel, wide, monkeypatch):
+@pytest.mark.parametrize(
+    ("panel", "wide", "side"),
+    [(4, 5, 1), (4, 5, 5), (loops.PANEL, loops.WIDE, loops.SIDE)],
+)
+def test_elimination_by_loops_is_that_of_arrays(panel, wide, side, monkeypatch):
     rng, reduced, blocks = np.random.default_rng(7), 15, 12
     plan = model.plan(reduced, blocks, groups_of(rng, reduced, blocks))
     first, second = zero_normals(plan), zero_normals(plan)
@@ -183,6 +190,7 @@ def test_elimination_by_loops_is_that_of_arrays(panel, wide, monkeypatch):
     among_of_arrays = among(plan, first, some)
     monkeypatch.setattr(loops, "PANEL", panel)
     monkeypatch.setattr(loops, "WIDE", wide)
+    monkeypatch.setattr(loops, "SIDE", side)
     monkeypatch.setattr(elimination, "is_worth_compiling", lambda rows=0: True)
     plain = SimpleNamespace(**{name: vars(loops)[name] for name in loops.COMPILED})
     monkeypatch.setattr(elimination, "compile_functions", lambda module, names: plain)
