@@ -176,6 +176,21 @@ class Batch:
             part = np.take_along_axis(part, self.order[:, None, :], axis=2)
         return part
 
+    def taken(self, rows, count):
+        """Which of the rows (k,) of its group, which has `count`, are in it; and a Batch of these.
+
+        That Batch has its rows one after the other, in the order given.
+        """
+        own = np.arange(count)[self.rows]
+        place = np.searchsorted(own, rows)
+        inside = np.append(own, count)[place] == rows
+        place = place[inside]
+        order, block, of_wide = (
+            None if one is None else one[place] for one in (self.order, self.block, self.place)
+        )
+        alone = Batch(self.group, slice(None), order, block, self.cuts, self.first[place], of_wide)
+        return inside, alone
+
 
 @dataclass(frozen=True)
 class Plan:
