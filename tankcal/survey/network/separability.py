@@ -168,8 +168,9 @@ def _correlated(problem, solution, number, members, aside):
 def _near(solution, table, number, b, aside):
     """Observations that stand out with i back: place, v_j, R_j, B."""
     inverse, back = aside.inverse, aside.back
-    v = table.residual / table.sd - b @ back
-    shared = np.einsum("nmd,nmd->nm", b @ inverse, b)
+    flat = b.reshape(-1, b.shape[-1])  # one product of all rows takes a third of many small ones
+    v = table.residual / table.sd - (flat @ back).reshape(b.shape[:2])
+    shared = np.einsum("rd,rd->r", flat @ inverse, flat).reshape(b.shape[:2])
     r = table.redundancy + shared
     squares = np.where(r > UNCONTROLLED, v**2 / np.maximum(r, UNCONTROLLED), 0.0)
     square = reduce(np.maximum, squares.T)  # of few values each: sooner than a maximum by rows
