@@ -24,10 +24,9 @@ from scipy.special import (
     kve,
     ndtri,
     sici,
-    stdtrit,
 )
 
-from tankcal.gum.coverage import coverage_factor
+from tankcal.gum.coverage import coverage_factor, student_quantile
 from tankcal.gum.inputs import Input
 
 
@@ -157,7 +156,7 @@ class StudentT(Distribution):
         return self.scale
 
     def _distance(self, tail):
-        return -self.scale * stdtrit(self.dof, tail)
+        return -self.scale * student_quantile(tail, self.dof)
 
     def _transform(self, t):
         half, root = self.dof / 2, np.sqrt(self.dof) * t

@@ -4,9 +4,10 @@ import json
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
+from tankcal.memory import without_collection
 from tankcal.messages import message
 from tankcal.record.long_tables import attached, copy_record, split, without_tables
-from tankcal.record.plain_data import whole, without_collection
+from tankcal.record.plain_data import whole
 from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
 
 __all__ = [

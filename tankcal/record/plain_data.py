@@ -1,9 +1,5 @@
 """Plain data: what JSON can hold, made of numbers, arrays, tuples and dicts."""
 
-import ctypes
-import gc
-import sys
-from contextlib import contextmanager
 from dataclasses import is_dataclass
 from math import isfinite
 
@@ -75,44 +71,6 @@ def _object(value):
             to_plain(said["values"]),
         )
     return plain
-
-
-@contextmanager
-def without_collection():
-    """A context in which the garbage collector rests while rows are made that are all kept.
-
-    It would look through all of them again and again, and find nothing to free: of a survey with
-    180 000 readings that takes as long as half of the work itself.
-    """
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
-
-
-@contextmanager
-def without_looking_back():
-    """A context in which the garbage collector leaves alone what is there already: it is kept."""
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()
-
-
-def return_freed_memory():
-    """Give memory that was freed back to the machine: what computing leaves is in many pieces.
-
-    Of a survey with 90 000 image points a hundred megabytes, which the C library of Linux would
-    keep while the papers are set; others have no such function, and nothing is done.
-    """
-    if sys.platform == "linux":
-        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-        if trim:
-            trim(0)
 
 
 def columns_of(rows, names=()):

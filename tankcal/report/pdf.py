@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from threading import Lock
 
 from tankcal.errors import TankcalError
-from tankcal.record.plain_data import return_freed_memory
+from tankcal.memory import return_freed_memory
 from tankcal.report import attachments
 from tankcal.report.blocks import WEB_ONLY
 from tankcal.report.page_tables import prepared

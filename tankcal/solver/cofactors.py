@@ -184,7 +184,7 @@ class Cofactors:
         found = -(self.block_diagonal @ block_rows(plan, normals.wide))
         return found.toarray() if 3 * plan.blocks * plan.reduced < DENSE else found.tocsr()
 
-    @property
+    @cached_property
     def block_diagonal(self):
         """L^-T of all blocks as one sparse matrix (3 nb, 3 nb)."""
         blocks = self.plan.blocks

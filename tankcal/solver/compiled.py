@@ -5,7 +5,7 @@ first asked for, with the results kept beside the source file. All functions tha
 must live in one module: numba looks only at that file's date when it decides whether what it kept
 is still true.
 
-Compiling takes 9 s, once on a machine, and loading what was kept 0.4 s in each run. The array form
+Compiling takes 9 s, once on a machine, and loading what was kept 0.3 s in each run. The array form
 needs about 12 us for an image point in an iteration (elimination included), compiled loops less
 than a tenth of that. So arrays do the work of small problems: no small job waits for a compiler,
 and fewer rows are enough where compiled loops lie beside the package, made at installation by
@@ -21,6 +21,8 @@ from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
 from types import FunctionType, SimpleNamespace
+
+from tankcal.memory import without_collection
 
 AT_ONCE = 20_000  # rows of a problem from which compiling pays: 0.3 s an iteration
 LOADING = 0.05  # of that is enough where loops need not be compiled, only loaded
@@ -126,15 +128,16 @@ def compile_functions(module, names):
     SimpleNamespace
         The compiled functions by their names; compiled once in a process.
     """
-    import numba
-
     known = dict(vars(module))
     called = {one for name in names for one in known[name].__code__.co_names}
-    for name in names:
-        plain = known[name]
-        bound = FunctionType(plain.__code__, known, name, plain.__defaults__)
-        bound.__module__, bound.__qualname__ = plain.__module__, plain.__qualname__
-        known[name] = _jitted(numba, bound, name in called)
+    with without_collection():
+        import numba
+
+        for name in names:
+            plain = known[name]
+            bound = FunctionType(plain.__code__, known, name, plain.__defaults__)
+            bound.__module__, bound.__qualname__ = plain.__module__, plain.__qualname__
+            known[name] = _jitted(numba, bound, name in called)
     return SimpleNamespace(**{name: known[name] for name in names})
 
 
@@ -188,9 +191,10 @@ class _Kept:
 
     def load_overload(self, signature, target):
         """The compiled function of a signature, None: it is not kept."""
-        found = self.beside.load_overload(signature, target)
-        if found is None and self.usual is not None:
-            found = self.usual.load_overload(signature, target)
+        with without_collection():
+            found = self.beside.load_overload(signature, target)
+            if found is None and self.usual is not None:
+                found = self.usual.load_overload(signature, target)
         return found
 
     def save_overload(self, signature, data):

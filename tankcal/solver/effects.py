@@ -12,6 +12,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
+from tankcal.solver.elimination import leverage
 from tankcal.solver.model import s_transform
 from tankcal.solver.threads import threads_for
 
@@ -153,31 +154,46 @@ def _response(cofactors, rows):
     return found
 
 
-def cofactors_within(cofactors, columns, jac):
-    """Cofactors of the rows of each observation with one another, J Q J'.
+def cofactors_within(cofactors, group, rows):
+    """Cofactors of the values of each observation with one another, J Q J'.
 
-    For a few observations: the cofactors of all their unknowns are worked out at once.
+    Two values by those of each and of their sum: 2 q_ab = q_(a+b)(a+b) - q_aa - q_bb.
 
     Parameters
     ----------
     cofactors : Cofactors
         Of the adjustment.
-    columns : ndarray, shape (n, K)
-        Number of the unknown of each derivative, -1 where it is fixed.
-    jac : ndarray, shape (n, m, K)
-        Rows of n observations.
+    group : int
+        Number of the group.
+    rows : ndarray, shape (n,)
+        Numbers of its observations, each once, in any order.
 
     Returns
     -------
     ndarray, shape (n, m, m)
         For variance factor 1.
     """
-    free = columns >= 0
-    unknowns, place = np.unique(columns[free], return_inverse=True)
-    places = np.full(columns.shape, len(unknowns))
-    places[free] = place
-    q = np.pad(cofactors.among(unknowns), (0, 1))
-    return jac @ q[places[:, :, None], places[:, None, :]] @ jac.transpose(0, 2, 1)
+    jac, plan = cofactors.jacobians[group], cofactors.plan
+    values = np.arange(jac.shape[1])
+    found = np.zeros((len(rows), len(values), len(values)))
+    of_block, cross = cofactors.of_blocks
+    for batch in plan.batches:
+        if batch.group != group:
+            continue
+        inside, batch = batch.taken(rows, len(jac))
+        if not inside.any():
+            continue
+        mine, q = batch.of(jac[rows[inside]]), np.zeros((len(batch.first), *found.shape[1:]))
+        for shift in range(len(values) // 2 + 1):
+            other = (values + shift) % len(values)
+            both = mine + mine[:, other] if shift else mine
+            q_both = leverage(plan, batch, both, cofactors.reduced_cofactors, cross, of_block)
+            if shift:
+                own = q[:, values, values]
+                q_both = (q_both - own - own[:, other]) / 2
+            q[:, values, other] = q[:, other, values] = q_both
+        found[inside] = q
+    return found
 
 
 def own_responses(cofactors, group, jac):

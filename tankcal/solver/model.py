@@ -176,6 +176,21 @@ class Batch:
             part = np.take_along_axis(part, self.order[:, None, :], axis=2)
         return part
 
+    def taken(self, rows, count):
+        """Which of the rows (k,) of its group, which has `count`, are in it; and a Batch of these.
+
+        That Batch has its rows one after the other, in the order given.
+        """
+        own = np.arange(count)[self.rows]
+        place = np.searchsorted(own, rows)
+        inside = np.append(own, count)[place] == rows
+        place = place[inside]
+        order, block, of_wide = (
+            None if one is None else one[place] for one in (self.order, self.block, self.place)
+        )
+        alone = Batch(self.group, slice(None), order, block, self.cuts, self.first[place], of_wide)
+        return inside, alone
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -235,7 +250,7 @@ def _structure(reduced, blocks, raw):
     together[:, reduced] = False
     changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
     alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
-    alike = series._join_series(together, alike)
+    alike = series._join_series(together, alike, np.ones(reduced + 1, dtype=np.int64))
     met = np.flatnonzero(together)
     starts = np.searchsorted(met, np.arange(blocks + 1) * (reduced + 1))
     owner = np.repeat(np.arange(blocks, dtype=np.int32), np.diff(starts))
@@ -263,14 +278,17 @@ def _mark(together, block, cuts, first):
 def _structure_by_loops(reduced, blocks, raw):
     """The same by compiled loops."""
     run = compile_functions(series, series.COMPILED)
-    together = np.zeros((blocks, reduced + 1), dtype=bool)
+    edges = _edges(reduced, raw)
+    widths = np.diff(edges)
+    piece_of = np.repeat(np.arange(len(widths)), widths)
+    together = np.zeros((blocks, len(widths)), dtype=bool)
     for _, _, _, block, cuts, first in raw:
         if block is not None:
-            run._mark(block, first, cuts, together)
-    together[:, reduced] = False
-    alike = run._join_series(together, run._list_series(together))
+            run._mark(block, first, cuts, piece_of, together)
+    together[:, -1] = False  # the spare column
+    alike = run._join_series(together, run._list_series(together), widths)
     starts = np.zeros(blocks + 1, dtype=int)
-    columns, ends = run._list_columns(together, reduced, alike, starts)
+    columns, ends = run._list_columns(together, edges, alike, starts)
     places = []
     for _, _, _, block, _, first in raw:
         place = None if block is None else np.empty(first.shape, dtype=np.int32)
@@ -278,6 +296,17 @@ def _structure_by_loops(reduced, blocks, raw):
             run._find_places(block, first, reduced, starts, columns, place)
         places.append(place)
     return starts, columns, ends, alike, places
+
+
+def _edges(reduced, raw):
+    """Where pieces of columns begin that rows with a block have together; the spare one is last."""
+    begins = np.zeros(reduced + 2, dtype=bool)
+    begins[[0, reduced, reduced + 1]] = True
+    for _, _, _, block, cuts, first in raw:
+        if block is not None:
+            begins[first] = True
+            begins[first + np.diff(cuts)] = True
+    return begins.nonzero()[0]
 
 
 AT_ONCE = 50_000  # rows whose columns are compared at a time

@@ -1,7 +1,8 @@
 """Which columns the blocks of a plan meet: plain loops, to be compiled.
 
-The marks (blocks, columns) say where rows with a block have a reduced column, the spare one of
-fixed unknowns left out. A series is of neighbouring blocks that have the same columns.
+The marks (blocks, pieces) say where rows with a block have reduced columns, the spare one of fixed
+unknowns left out. A piece is of neighbouring columns that all rows have together or not at all: of
+photographs the six of each. A series is of neighbouring blocks that have the same columns.
 """
 
 import numpy as np
@@ -18,12 +19,16 @@ COMPILED = (
 )
 
 
-def _mark(block, first, cuts, together):
-    """Mark (blocks, columns) where rows with a block have columns: first (n, s) of runs."""
+def _mark(block, first, cuts, piece_of, together):
+    """Mark (blocks, pieces) where rows with a block have columns: first (n, s) of runs.
+
+    piece_of  (columns,) number of the piece of each column
+    """
     for i in range(len(block)):
         for run in range(len(cuts) - 1):
-            for step in range(cuts[run + 1] - cuts[run]):
-                together[block[i], first[i, run] + step] = True
+            last = first[i, run] + cuts[run + 1] - cuts[run] - 1
+            for piece in range(piece_of[first[i, run]], piece_of[last] + 1):
+                together[block[i], piece] = True
 
 
 def _find_breaks(columns, spare, begins):
@@ -36,7 +41,7 @@ def _find_breaks(columns, spare, begins):
 
 
 def _list_series(together):
-    """alike of a Plan, by the marks (blocks, columns)."""
+    """alike of a Plan, by the marks (blocks, pieces)."""
     blocks = len(together)
     alike, series = np.zeros(blocks + 1, dtype=np.int64), 0
     for o in range(blocks):
@@ -51,20 +56,22 @@ def _list_series(together):
     return alike[: series + 1].copy()
 
 
-def _join_series(together, alike):
-    """alike of a Plan, of series that may be longer; the marks (blocks, columns) are changed.
+def _join_series(together, alike, widths):
+    """alike of a Plan, of series that may be longer; the marks (blocks, pieces) are changed.
 
     Neighbours of at most TOGETHER blocks all get the columns of each other where one series is less
     work than two: zeros are multiplied sooner than many small products are spread.
+
+    widths  (pieces,) columns of each
     """
     joined, last = np.zeros(len(together) + 1, dtype=np.int64), 0
     for k in range(len(alike) - 1):
         for begin in range(alike[k], alike[k + 1], TOGETHER):
             end, first = min(begin + TOGETHER, alike[k + 1]), joined[last]
             both = together[first] | together[begin]
-            work = (end - first + LEAVING) * both.sum() ** 2
-            apart = (begin - first + LEAVING) * together[first].sum() ** 2
-            apart += (end - begin + LEAVING) * together[begin].sum() ** 2
+            work = (end - first + LEAVING) * (both * widths).sum() ** 2
+            apart = (begin - first + LEAVING) * (together[first] * widths).sum() ** 2
+            apart += (end - begin + LEAVING) * (together[begin] * widths).sum() ** 2
             if begin == 0 or (end - first <= TOGETHER and work <= apart):
                 together[first] = both
             else:
@@ -77,12 +84,17 @@ def _join_series(together, alike):
     return joined
 
 
-def _list_columns(together, reduced, alike, starts):
-    """columns and ends of a Plan, by the marks (blocks, columns); starts is filled."""
+def _list_columns(together, edges, alike, starts):
+    """columns and ends of a Plan, by the marks (blocks, pieces); starts is filled.
+
+    edges  (pieces + 1,) where they begin, and the end
+    """
+    pieces = len(edges) - 1
     for k in range(len(alike) - 1):
         count = 0
-        for c in range(reduced):
-            count += together[alike[k], c]
+        for piece in range(pieces):
+            if together[alike[k], piece]:
+                count += edges[piece + 1] - edges[piece]
         for o in range(alike[k], alike[k + 1]):
             starts[o + 1] = starts[o] + count
     columns, runs = np.empty(starts[-1], dtype=np.int32), 0
@@ -90,11 +102,13 @@ def _list_columns(together, reduced, alike, starts):
     for k in range(len(alike) - 1):
         first, others = starts[alike[k]], alike[k + 1] - alike[k] - 1
         at, last, before = first, -2, runs
-        for c in range(reduced):
-            if together[alike[k], c]:
-                if c != last + 1:
-                    ends[runs] = at
-                    runs += 1
+        for piece in range(pieces):
+            if not together[alike[k], piece]:
+                continue
+            if edges[piece] != last + 1:
+                ends[runs] = at
+                runs += 1
+            for c in range(edges[piece], edges[piece + 1]):
                 columns[at] = c
                 at, last = at + 1, c
         length, count = at - first, runs - before

@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 from scipy.integrate import quad
 
+from tankcal.gum.coverage import student_quantile
 from tankcal.gum.distributions import (
     FAMILIES,
     CurvilinearTrapezoid,
@@ -50,6 +51,15 @@ def test_quantiles_and_sd_are_those_of_scipy(one):
     low = P[P <= 0.5]
     assert one.quantile(low) == pytest.approx(other.ppf(low), rel=1e-12)
     assert one.sd == pytest.approx(other.std(), rel=1e-12)
+
+
+@pytest.mark.parametrize("dof", [1.5, 3.0, 3.7, 5.0, 30.0, 1e5])
+def test_many_quantiles_of_students_t(dof):
+    """Property: many at once are those one by one, to the last tail, and the cdf undoes them."""
+    tail = np.concatenate([np.geomspace(1e-15, 0.4, 2000), np.linspace(0.4, 0.499, 500), [0.5]])
+    found = student_quantile(tail, dof)
+    assert found == pytest.approx(np.array([student_quantile(p, dof) for p in tail]), rel=3e-12)
+    assert stats.t.cdf(found[:-1], dof) == pytest.approx(tail[:-1], rel=1e-10)
 
 
 def trapezoid_density(x, w, d):

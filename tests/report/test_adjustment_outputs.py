@@ -26,10 +26,11 @@ from tankcal import report
 from tankcal.camera.model import PARAMETERS, Form
 from tankcal.cli import main
 from tankcal.job.covariance import read_covariance
+from tankcal.memory import return_freed_memory, without_collection
 from tankcal.pipeline.chain import adjust_job
 from tankcal.record.adjusted import _edge_effect, adjusted_points_of
 from tankcal.record.adjustment import _group
-from tankcal.record.plain_data import return_freed_memory, rows_of, without_collection
+from tankcal.record.plain_data import rows_of
 from tankcal.report import attachments, outputs, workbook
 from tankcal.report.document import blocks_of
 from tankcal.report.notebook import execute, joined

@@ -219,8 +219,9 @@ def test_cofactors_of_observation_are_rows_times_responses(datum):
     """Second method: the change of all unknowns, Q J', through the rows once more."""
     found = sharply(CASES[datum], datum)
     solution, model = found.solution, found.problem.model
-    for group, jac in zip(model.groups, solution.cofactor.jacobians, strict=True):
-        columns, own = group.columns[:7], jac[:7]
+    for k, (group, jac) in enumerate(zip(model.groups, solution.cofactor.jacobians, strict=True)):
+        rows = np.arange(len(jac))[::-3][:7]
+        columns, own = group.columns[rows], jac[rows]
         changes = np.hstack([part for _, part in responses(solution.cofactor, columns, own)])
         changes = np.vstack([changes, np.zeros((1, changes.shape[1]))])
         wide = np.einsum("nmk,nkd->nmd", own, changes[columns]).reshape(
@@ -228,5 +229,5 @@ def test_cofactors_of_observation_are_rows_times_responses(datum):
         )
         expected = np.array([wide[n, :, n, :] for n in range(len(own))])
         np.testing.assert_allclose(
-            cofactors_within(solution.cofactor, columns, own), expected, atol=1e-9
+            cofactors_within(solution.cofactor, k, rows), expected, atol=1e-9
         )

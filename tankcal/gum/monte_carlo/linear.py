@@ -18,6 +18,7 @@ LEAST = 1e-6  # what the terms left out may be worth, as a probability
 SMOOTH = 1e-6  # phi at the end of a short table of what has neither kinks nor steps
 CLOSE = 1e-4  # last step of Newton, in scales: the next one would be some 1e-8
 BLOCK, ROWS = 1 << 18, 256  # numbers held at once, but of so many rows at least
+AT_ONCE = 8  # terms of which the factors are computed, so that they stay in the processor's cache
 
 
 class Shape:
@@ -124,18 +125,20 @@ class _Sums:
         half = np.sqrt(36 * own**2 + np.sum((parts * reach) ** 2, axis=1)) / self.scale
         self.spacing = np.pi / np.maximum(half, 6.0)
         order = np.arange(terms)[:, None] + 0.5
-        t = order * (self.spacing / self.scale)
-        phi = own * t
-        phi *= phi
-        phi *= -0.5
-        np.exp(phi, out=phi)
-        for shape, part in zip(shapes, np.abs(parts.T), strict=True):
-            phi *= shape.characteristic(t, part)
-        last = np.max(np.abs(phi[-8:]), axis=0)
-        self.converged = last / (np.pi * order[-1] * self.spacing) < LEAST
         self.phi = np.empty((terms, 2, len(own)))  # of the density, of the cdf
-        self.phi[:, 0] = phi
-        np.divide(phi, order, out=self.phi[:, 1])
+        by_order, sizes = self.spacing / self.scale, np.abs(parts.T)
+        for some in range(0, terms, AT_ONCE):
+            t = order[some : some + AT_ONCE] * by_order
+            phi = own * t
+            phi *= phi
+            phi *= -0.5
+            np.exp(phi, out=phi)
+            for shape, part in zip(shapes, sizes, strict=True):
+                phi *= shape.characteristic(t, part)
+            self.phi[some : some + AT_ONCE, 0] = phi
+        np.divide(self.phi[:, 0], order, out=self.phi[:, 1])
+        last = np.max(np.abs(self.phi[-8:, 0]), axis=0)
+        self.converged = last / (np.pi * order[-1] * self.spacing) < LEAST
 
     def only(self, chosen):
         """Keep the chosen rows."""

@@ -86,24 +86,24 @@ class Lines:
 
     rows    QuadraticRows in independent coordinates e
     normal  (n,) which coordinates are unit normals; shapes  (n,) Shape of the others
-    scale   (n,) of the coordinates
+    scale   (n,) of the coordinates, 1 of the normal ones
     """
 
     def __init__(self, rows, normal, shapes, scale):
-        sizes = np.abs(rows.jacobian) * scale
-        own = np.linalg.norm(sizes[:, normal], axis=1)
-        others = np.where(normal, 0.0, sizes)
-        largest = np.argmax(others, axis=1)
-        everyone = np.arange(len(largest))
-        self.along = np.where(own >= others[everyone, largest], -1, largest)
-        direction = np.zeros_like(rows.jacobian)
-        together = self.along < 0
-        own_part = np.where(normal, rows.jacobian, 0.0)[together]
-        length = np.linalg.norm(own_part, axis=1)[:, None]
-        direction[together] = np.divide(own_part, length, out=own_part * 0, where=length > 0)
+        other = np.flatnonzero(~normal)
+        sizes = np.abs(rows.jacobian[:, other]) * scale[other]
+        normals = rows.jacobian[:, normal]
+        own = np.linalg.norm(normals, axis=1)
+        together = own >= np.max(sizes, axis=1, initial=0.0)
         alone = np.flatnonzero(~together)
-        sign = np.sign(rows.jacobian[alone, largest[alone]])
-        direction[alone, largest[alone]] = sign
+        largest = other[np.argmax(sizes[alone], axis=1)] if len(alone) else alone
+        self.along = np.full(len(own), -1)
+        self.along[alone] = largest
+        direction = np.zeros_like(rows.jacobian)
+        length = own[:, None]
+        direction[:, normal] = np.divide(normals, length, out=normals * 0, where=length > 0)
+        direction[alone] = 0.0
+        direction[alone, largest] = np.sign(rows.jacobian[alone, largest])
         self.rows, self.direction, self.shapes, self.scale = rows, direction, shapes, scale
         self.slope = np.einsum("ra,ra->r", rows.jacobian, direction)
         twist, by_input = np.zeros(direction.shape[::-1]), np.ascontiguousarray(direction.T)
@@ -112,8 +112,9 @@ class Lines:
             twist[felt] += twice[form] * (hessian @ by_input[felt])
         self.twist = twist.T
         self.bend = np.einsum("ar,ar->r", twist, by_input) / 2
-        self.reach = np.where(together, 1.0, scale[largest])
-        self.pure = ~np.any(others != 0, axis=1)  # normal inputs only: the linear part is exact
+        self.reach = np.ones(len(own))
+        self.reach[alone] = scale[largest]
+        self.pure = ~np.any(sizes != 0, axis=1)  # normal inputs only: the linear part is exact
 
     def groups(self, draws):
         """Blocks of rows that share their kind of direction: (coordinate or -1, row numbers)."""

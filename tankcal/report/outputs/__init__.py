@@ -10,9 +10,9 @@ from tankcal import record as records
 from tankcal import report
 from tankcal.errors import CellError, InputError, Problem, TankcalError, VocabularyError
 from tankcal.job.tables import COVARIANCE_FILE
+from tankcal.memory import without_collection, without_looking_back
 from tankcal.messages import message
 from tankcal.record import long_tables
-from tankcal.record.plain_data import without_collection, without_looking_back
 from tankcal.report import dcc, folders, manifest
 from tankcal.report.attachments import sha256
 from tankcal.report.outputs import tables

@@ -29,6 +29,7 @@ Source: Foerstner 1983, Reliability and discernability of extended Gauss-Markov 
 """
 
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -68,7 +69,7 @@ def alternatives(adjusted, source, row, held=None):
             continue
         columns = problem.model.groups[k].columns
         b = solution.cofactor.jacobians[k] @ np.take(aside.moves, columns, axis=0)
-        for i, v, cofactors, b_i in _near(solution, problem, table, k, b, aside):
+        for i, v, cofactors, b_i in _near(solution, table, k, b, aside):
             tests = _tests(v, cofactors, -aside.inverse @ b_i.T, aside)
             if tests is not None:
                 found.append((*tests, table.source, int(table.rows[i])))
@@ -164,21 +165,22 @@ def _correlated(problem, solution, number, members, aside):
             yield (*tests, int(members.source[mine[0]]), int(members.row[mine[0]]))
 
 
-def _near(solution, problem, table, number, b, aside):
+def _near(solution, table, number, b, aside):
     """Observations that stand out with i back: place, v_j, R_j, B."""
     inverse, back = aside.inverse, aside.back
-    v = table.residual / table.sd - b @ back
-    shared = np.einsum("nmd,nmd->nm", b @ inverse, b)
+    flat = b.reshape(-1, b.shape[-1])  # one product of all rows takes a third of many small ones
+    v = table.residual / table.sd - (flat @ back).reshape(b.shape[:2])
+    shared = np.einsum("rd,rd->r", flat @ inverse, flat).reshape(b.shape[:2])
     r = table.redundancy + shared
-    square = np.where(r > UNCONTROLLED, v**2 / np.maximum(r, UNCONTROLLED), 0.0).max(axis=1)
-    near = np.flatnonzero(table.used & (square > WORTH) & (b != 0).any(axis=(1, 2)))
+    squares = np.where(r > UNCONTROLLED, v**2 / np.maximum(r, UNCONTROLLED), 0.0)
+    square = reduce(np.maximum, squares.T)  # of few values each: sooner than a maximum by rows
+    near = np.flatnonzero(table.used & (square > WORTH))
+    near = near[(b[near] != 0).any(axis=(1, 2))]
     near = near[np.argsort(-square[near], kind="stable")][:LOOKED_AT]
     near = near[_may_explain(v[near], table.redundancy[near], shared[near].sum(axis=1), aside)]
     if not len(near):
         return
-    columns = problem.model.groups[number].columns[near]
-    jac = solution.cofactor.jacobians[number][near]
-    for j, own in zip(near, cofactors_within(solution.cofactor, columns, jac), strict=True):
+    for j, own in zip(near, cofactors_within(solution.cofactor, number, near), strict=True):
         yield j, v[j], np.eye(len(own)) - own + b[j] @ inverse @ b[j].T, b[j]
 
 
