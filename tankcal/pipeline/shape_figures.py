@@ -179,7 +179,9 @@ class ShapeBase:
         rows = scipy.sparse.csr_array(rows)
         value = rows @ self._value_m
         value += rows[:, self._count :] @ self._origins()
-        variances = [rows.multiply(rows @ one).sum(axis=1) for one in self._unseen()]
+        unseen = self._found.unseen_of(rows)
+        kinds = np.array([one.kind for one in COMPONENTS])
+        variances = [unseen[kinds == kind].sum(axis=0) for kind in KINDS]
         parts = [Source("", np.sqrt(np.maximum(one, 0.0))[:, None]) for one in variances]
         by_survey = [one.mapped(lambda columns: rows @ columns) for one in self._sources]
         told = combine([*by_survey, *parts], len(value))
@@ -192,12 +194,6 @@ class ShapeBase:
             for i, c in self._centre_of.items()
         ]
         return np.concatenate(found) if found else np.zeros(0)
-
-    def _unseen(self):
-        """Covariance (f, f) of what was not seen of the wall, of each kind of component."""
-        for kind in KINDS:
-            chosen = [i for i, one in enumerate(COMPONENTS) if one.kind == kind]
-            yield sum(self._found.unseen(i) for i in chosen)
 
     def _causes(self):
         """`Source`s of what the survey leaves uncertain, and of what was declared."""

@@ -96,16 +96,7 @@ class Wall:
 
     def factors(self, job, weights):
         """`Factor`s of what the points leave uncertain about features, (f, m) by the readings."""
-        by_points, causes = self.radii_by_points, job.points.causes
-        if scipy.sparse.issparse(self.covariance_m2):  # of many points: sums over each reading's
-            of_readings = by_points @ self.covariance_m2 @ by_points.T
-            covariance = weights @ (of_readings @ weights.T)
-        else:
-            jacobian = weights @ by_points
-            covariance = jacobian @ (self.covariance_m2 @ jacobian.T)
-        index = coordinates_of(self.accepted)
-        effects = [weights @ (by_points @ cause.column_m[index]) for cause in causes]
-        found = survey_factors(covariance, self.noise_dof, causes, effects)
+        found = self._factors_of_points(job.points.causes, weights)
         found = (*found, *factors_of_undecided(weights @ self.undecided_m))
         if self.read is None:
             return found
@@ -119,6 +110,24 @@ class Wall:
             *factors_of_readings(self.readings, weights[:, self.points_read :]),
             *plates,
         )
+
+    def _factors_of_points(self, causes, weights):
+        """Those of the points: of the features, or of the readings where these are fewer, and of
+        the features by them, which is the same.
+        """
+        if len(weights) > weights.shape[1]:
+            of_readings = self._factors_of_points(causes, np.eye(weights.shape[1]))
+            return tuple(one.mapped(lambda columns: weights @ columns) for one in of_readings)
+        by_points = self.radii_by_points
+        if scipy.sparse.issparse(self.covariance_m2):  # of many points: sums over each reading's
+            of_readings = by_points @ self.covariance_m2 @ by_points.T
+            covariance = weights @ (of_readings @ weights.T)
+        else:
+            jacobian = weights @ by_points
+            covariance = jacobian @ (self.covariance_m2 @ jacobian.T)
+        index = coordinates_of(self.accepted)
+        effects = [weights @ (by_points @ cause.column_m[index]) for cause in causes]
+        return survey_factors(covariance, self.noise_dof, causes, effects)
 
     def read_with(self, weights):
         """{input: (f,) derivative of features}: plates that points on the other side were moved

@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
+import scipy.sparse
 from generated_walls import FULL_TURN
 
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
-from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.estimate import WallField, gauss_heights
 from tankcal.geometry.field.sites import Sites, free_design
@@ -79,9 +79,19 @@ def test_values_and_their_doubt_by_conditioning():
         expected = gain @ left + np.append(np.full(count, RADIUS_M), np.zeros(4))
         doubt = whole[n:, n:] - gain @ whole[:n, n:]
         np.testing.assert_allclose(found.value_m, expected, atol=2e-6)
-        unseen = sum(found.unseen(i) for i in range(len(COMPONENTS)))
-        own = found.weights @ field.noise_m2 @ found.weights.T + unseen
-        np.testing.assert_allclose(np.sqrt(np.diag(own)), np.sqrt(np.diag(doubt)), rtol=2e-3)
+        rows = sums_of(count, len(found.value_m), rng)
+        own = np.einsum("rn,rn->r", *2 * [rows @ found.weights @ np.sqrt(field.noise_m2)])
+        own += found.unseen_of(scipy.sparse.csr_array(rows)).sum(axis=0)
+        expected = np.einsum("rf,rf->r", rows @ doubt, rows)
+        np.testing.assert_allclose(np.sqrt(own), np.sqrt(expected), rtol=2e-3)
+
+
+def sums_of(places, values, rng):
+    """Rows of each value, of each two places, of three, of a place and a centre, and of none."""
+    rows = [*np.eye(values), np.zeros(values)]
+    rows += [rows[i] - 0.7 * rows[j] for i in range(places) for j in range(i)]
+    rows += [rows[0] + rows[1] - 2 * rows[2], rows[3] + 0.4 * rows[places]]
+    return np.array(rows) * rng.choice([-1.0, 1.0], size=(len(rows), 1))
 
 
 def test_weights_are_the_derivative_by_the_readings():

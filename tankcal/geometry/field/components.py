@@ -112,6 +112,12 @@ class Component:
             return np.exp(-np.abs(np.subtract.outer(zeta, other)) / LOCAL_LENGTH)
         return self.height_columns(zeta) @ self.height_columns(other).T
 
+    def height_between(self, zeta, other):
+        """(n,) h between each height (n,) of a course and the other (n,) beside it."""
+        if self.orders == "local":
+            return np.exp(-np.abs(zeta - other) / LOCAL_LENGTH)
+        return np.sum(self.height_columns(zeta) * self.height_columns(other), axis=1)
+
 
 _FREE = (0, 0, *(order**-2.0 for order in range(2, 7)))
 _LINEAR = (0, 1)

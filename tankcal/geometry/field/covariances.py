@@ -91,19 +91,27 @@ class Covariances:
 
     def spread(self, weights, index):
         """(f, f) covariance of functionals (f, n) of the sites, by one component."""
-        one, found = COMPONENTS[index], 0.0
+        return sum(left @ right.T for left, right in self._halves(weights, index))
+
+    def spread_alone(self, weights, index):
+        """(f,) variances of them, without their covariances."""
+        halves = self._halves(weights, index)
+        return sum(np.einsum("fk,fk->f", left, right) for left, right in halves)
+
+    def _halves(self, weights, index):
+        """Pairs (f, k) whose products add up to the covariance of functionals by one component."""
+        one = COMPONENTS[index]
         common = one.common or index in self.peaks
         for members in [slice(None)] if common else self.runs:
             part = weights[:, members]
             if one.shape == "seam":
                 seams = self._seams(members)
                 seams = seams if one.is_level else seams * self._height(index, members)
-                found = found + part @ seams @ part.T
+                yield part @ seams, part
             else:
                 columns = self.peaks if index in self.peaks else self._columns
                 by_columns = part @ columns[index][members]
-                found = found + by_columns @ by_columns.T
-        return found
+                yield by_columns, by_columns
 
     @cached_property
     def peaks(self):

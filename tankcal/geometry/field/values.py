@@ -16,7 +16,13 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
-from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, weld_columns
+from tankcal.geometry.field.components import (
+    COMPONENTS,
+    azimuth_correlations,
+    oval_columns,
+    seam_correlation,
+    weld_columns,
+)
 
 
 @dataclass(frozen=True)
@@ -93,14 +99,28 @@ class FieldValues:
         self.weights[rows] = -scipy.linalg.cho_solve(factor, free.T, check_finite=False).T
         self.weights[rows, sites] += 1.0
 
-    def unseen(self, index):
-        """(f, f) covariance of the errors by what was not seen of one component, m2."""
-        count, size = len(self._spots), self._field.amplitudes.variances_m2[index]
-        found = size * self._covariances.spread(self.weights, index)
-        seen = self.weights @ self._across[index].T
-        found[:, :count] -= seen
-        found[:count] -= seen.T
-        found[:count, :count] += self._within(index)
+    def unseen_of(self, rows):
+        """What was not seen of each component, in sums of the values.
+
+        Parameters
+        ----------
+        rows : scipy.sparse.csr_array, shape (r, f)
+            Each of few places: only these are asked for with one another.
+
+        Returns
+        -------
+        ndarray, shape (components, r)
+            Variances of the errors, m2.
+        """
+        weights, of_places = rows @ self.weights, rows[:, : len(self._spots)]
+        row, first, second, product = _pairs(of_places)
+        found = np.empty((len(COMPONENTS), len(weights)))
+        sizes = self._field.amplitudes.variances_m2
+        for index, (size, across) in enumerate(zip(sizes, self._across, strict=True)):
+            found[index] = size * self._covariances.spread_alone(weights, index)
+            found[index] -= 2 * np.einsum("rn,rn->r", weights, of_places @ across)
+            own = size * product * self._between(index, first, second)
+            found[index] += np.bincount(row, own, len(weights))
         return found
 
     def _design(self, centres):
@@ -134,16 +154,21 @@ class FieldValues:
             found = found * (spots.course[:, None] == sites.course)
         return size * found
 
-    def _within(self, index):
-        """(p, p) covariance of the places by one component itself, m2."""
+    def _between(self, index, first, second):
+        """(k,) covariance between places (k,) and others by one component of unit variance."""
         one, spots = COMPONENTS[index], self._spots
-        size = self._field.amplitudes.variances_m2[index]
         if one.shape == "weld":
-            return size * self._peaks[index] @ self._peaks[index].T
-        found = self._among[one.shape] * one.height_covariance(spots.zeta, spots.zeta)
+            return np.sum(self._peaks[index][first] * self._peaks[index][second], axis=1)
+        found = one.height_between(spots.zeta[first], spots.zeta[second])
+        if one.shape == "oval":
+            waves = oval_columns(spots.azimuth_rad)
+            found = found * np.sum(waves[first] * waves[second], axis=1)
+        elif one.shape == "seam":
+            away = spots.azimuth_rad[first] - spots.azimuth_rad[second]
+            found = found * seam_correlation(away, self._field.nominal_m)
         if not one.common:
-            found = found * (spots.course[:, None] == spots.course)
-        return size * found
+            found = found * (spots.course[first] == spots.course[second])
+        return found
 
     @cached_property
     def _along(self):
@@ -152,12 +177,6 @@ class FieldValues:
             self._spots.azimuth_rad, self._covariances.azimuths_rad, self._field.nominal_m
         )
         return {shape: self._covariances.at_sites(one) for shape, one in found.items()}
-
-    @cached_property
-    def _among(self):
-        """{shape: (p, p) c among the places}."""
-        azimuth = self._spots.azimuth_rad
-        return azimuth_correlations(azimuth, azimuth, self._field.nominal_m)
 
     @cached_property
     def _peaks(self):
@@ -172,3 +191,15 @@ class FieldValues:
             for index, one in enumerate(COMPONENTS)
             if one.shape == "weld"
         }
+
+
+def _pairs(rows):
+    """Each two places of a row of rows (r, p), in both orders and with itself: the row's number,
+    both places, and the product of their coefficients.
+    """
+    rows = rows.tocsr()
+    count = np.diff(rows.indptr)
+    row = np.repeat(np.arange(len(count)), count**2)
+    within = np.arange(len(row)) - np.repeat(np.cumsum(count**2) - count**2, count**2)
+    first, second = (rows.indptr[row] + part for part in np.divmod(within, count[row]))
+    return row, rows.indices[first], rows.indices[second], rows.data[first] * rows.data[second]
