@@ -16,7 +16,6 @@ Source: Koch 1999, section 3.2.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
 
 from tankcal.geometry.field.blunders import restricted_precision
 from tankcal.geometry.field.components import COMPONENTS
@@ -100,10 +99,7 @@ def _bound(correlation):
 
 def noise_of_wall(wall):
     """(n, n) covariance of the readings; a field of points alone has it section by section."""
-    if wall.read is not None:
-        return wall.field.noise_m2
-    noise = wall.radii_by_points @ (wall.radii_by_points @ wall.covariance_m2).T
-    return noise.toarray() if scipy.sparse.issparse(noise) else noise
+    return wall.points_m2 if wall.read is None else wall.field.noise_m2
 
 
 def _of_mean_radius(field):

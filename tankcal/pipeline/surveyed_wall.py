@@ -1,6 +1,7 @@
 """The wall of a tank that points show, with straps and lines beside them."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse
@@ -118,16 +119,15 @@ class Wall:
         if len(weights) > weights.shape[1]:
             of_readings = self._factors_of_points(causes, np.eye(weights.shape[1]))
             return tuple(one.mapped(lambda columns: weights @ columns) for one in of_readings)
-        by_points = self.radii_by_points
-        if scipy.sparse.issparse(self.covariance_m2):  # of many points: sums over each reading's
-            of_readings = by_points @ self.covariance_m2 @ by_points.T
-            covariance = weights @ (of_readings @ weights.T)
-        else:
-            jacobian = weights @ by_points
-            covariance = jacobian @ (self.covariance_m2 @ jacobian.T)
-        index = coordinates_of(self.accepted)
-        effects = [weights @ (by_points @ cause.column_m[index]) for cause in causes]
+        covariance, index = weights @ self.points_m2 @ weights.T, coordinates_of(self.accepted)
+        effects = [weights @ (self.radii_by_points @ cause.column_m[index]) for cause in causes]
         return survey_factors(covariance, self.noise_dof, causes, effects)
+
+    @cached_property
+    def points_m2(self):
+        """(n, n) covariance of the field's readings by the points, between sections as well."""
+        found = self.radii_by_points @ (self.radii_by_points @ self.covariance_m2).T
+        return found.toarray() if scipy.sparse.issparse(found) else found
 
     def read_with(self, weights):
         """{input: (f,) derivative of features}: plates that points on the other side were moved
