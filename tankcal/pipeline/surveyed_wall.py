@@ -95,6 +95,14 @@ class Wall:
         own = by_points @ (self.covariance_m2[index][:, index] @ by_points.T)
         return own if self.told is None else own + self.told.spread_of(by_points, members)
 
+    def point_covariances_m2(self):
+        """(m, 3, 3) covariance of each accepted point with itself, as `spread_of` has it."""
+        found = np.empty((len(self.accepted), 3, 3))
+        for row, column in np.ndindex(3, 3):
+            along = self.covariance_m2.diagonal(column - row)
+            found[:, row, column] = along[min(row, column) :: 3][: len(found)]
+        return found if self.told is None else found + self.told.spread_alone()
+
     def factors(self, job, weights):
         """`Factor`s of what the points leave uncertain about features, (f, m) by the readings."""
         found = self._factors_of_points(job.points.causes, weights)

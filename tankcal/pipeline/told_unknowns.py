@@ -59,6 +59,12 @@ class ToldUnknowns:
         moved, beside = (by_points @ one[index] for one in (self.moved_m, self.with_points_m2))
         return moved @ beside.T + beside @ moved.T
 
+    def spread_alone(self):
+        """(m, 3, 3) what it adds to the covariance of each point with itself."""
+        each = (one.reshape(-1, 3, one.shape[1]) for one in (self.moved_m, self.with_points_m2))
+        half = np.einsum("mis,mjs->mij", *each)
+        return half + half.transpose(0, 2, 1)
+
 
 def told_unknowns(points, unbound, field, parts):
     """`ToldUnknowns` of a field whose points have unknowns in common.

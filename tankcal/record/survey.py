@@ -179,18 +179,19 @@ def _points_of_tank(result):
     if result.wall is None:
         return _points_of_scan(result) if result.scan is not None else []
     job, shell = result.job, result.wall.shell
-    place = {}
+    place, covariances = {}, result.wall.point_covariances_m2()
     for section in result.wall.sections:
         for member, residual in zip(section.group.members, section.circle.residuals_m, strict=True):
             place[result.wall.accepted[member]] = {
-                "cov_m2": _covariance_of(result, member),
+                "cov_m2": covariances[member],
                 "course": job.courses[section.group.course].name,
                 "section": section.group.name,
                 "residual_m": residual,
             }
+    used = shell.on_wall.tolist()
     return [
         _surveyed(name, job.points.xyz_m[index], **place.get(index, {}),
-                  generatrix=job.points.generatrix[index], used=bool(shell.on_wall[index]))
+                  generatrix=job.points.generatrix[index], used=used[index])
         for index, name in enumerate(job.points.names)
     ]  # fmt: skip
 
@@ -203,10 +204,6 @@ def _points_of_scan(result):
                   residual_m=scan.residuals_m[index] if index in used else None, used=index in used)
         for index, name in enumerate(points.names)
     ]  # fmt: skip
-
-
-def _covariance_of(result, member):
-    return result.wall.spread_of(np.eye(3), [member])
 
 
 def rejected_of(result):

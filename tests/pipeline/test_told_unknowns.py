@@ -65,6 +65,8 @@ def test_points_have_the_covariance_of_all_errors(tmp_path, parts):
     count = len(wall.accepted)
     found, whole = wall.spread_of(np.eye(3 * count), np.arange(count)), propagated(wall)
     np.testing.assert_allclose(found, whole, atol=1e-6 * np.abs(whole).max())
+    own = found.reshape(count, 3, count, 3)[range(count), :, range(count)]
+    np.testing.assert_allclose(wall.point_covariances_m2(), own, atol=1e-12 * np.abs(own).max())
     for section in wall.sections:
         assert section.circle.cofactor_m2[2, 2] > 0
 
