@@ -34,7 +34,7 @@ class Wall:
         Heights of the joints above the bottom, along the vertical, m.
     accepted : ndarray, shape (m,)
         Indices of the accepted points in job.points.
-    covariance_m2 : ndarray or sparse array, shape (3 m, 3 m)
+    covariance_m2 : ndarray, sparse array or `PredictedCovariance`, shape (3 m, 3 m)
         Of the accepted points, m2.
     noise_dof : float
         Degrees of freedom of that covariance's scale.
@@ -127,9 +127,18 @@ class Wall:
         if len(weights) > weights.shape[1]:
             of_readings = self._factors_of_points(causes, np.eye(weights.shape[1]))
             return tuple(one.mapped(lambda columns: weights @ columns) for one in of_readings)
-        covariance, index = weights @ self.points_m2 @ weights.T, coordinates_of(self.accepted)
+        covariance, index = self._covariance_of(weights), coordinates_of(self.accepted)
         effects = [weights @ (self.radii_by_points @ cause.column_m[index]) for cause in causes]
         return survey_factors(covariance, self.noise_dof, causes, effects)
+
+    def _covariance_of(self, weights):
+        """(f, f) covariance of features by the points; that of a plan of many points acts on few
+        columns, and is not written out.
+        """
+        if isinstance(self.covariance_m2, np.ndarray) or scipy.sparse.issparse(self.covariance_m2):
+            return weights @ self.points_m2 @ weights.T
+        by_points = weights @ self.radii_by_points
+        return by_points @ (self.covariance_m2 @ by_points.T)
 
     @cached_property
     def points_m2(self):
