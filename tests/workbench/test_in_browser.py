@@ -199,6 +199,8 @@ def test_lab_opens_the_notebook_and_marks_a_cell(tmp_path):
         browser.drawn()
         browser.run("jupyterapp.commands.execute('notebook:run-all-cells'); 1")
         browser.wait_for(f"document.querySelector('{height}')", SLOW_S)
+        browser.wait_for(f"{ready} === 'idle'", SLOW_S)  # what cells still write moves the table
+        browser.drawn()
         browser.click(height)
         browser.write("1x9")  # letters are no shortcuts of JupyterLab there
         browser.press("Enter", 13)
