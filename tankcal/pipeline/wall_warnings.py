@@ -21,7 +21,7 @@ def weak_sections(job, groups, azimuth_rad):
 
     Each is told by itself, or all of a kind at once where they are more than `TOLD_ALONE`.
     """
-    few, open_ones = [], []
+    few, gaps = [], []
     for group in groups:
         ordered = np.sort(azimuth_rad[group.members])
         gap = np.degrees(np.max(np.diff(ordered, append=ordered[0] + 2 * np.pi)))
@@ -29,64 +29,62 @@ def weak_sections(job, groups, azimuth_rad):
         if len(ordered) < ADVISED_POINTS:
             few.append((len(ordered), named))
         if gap > WIDE_GAP_DEG:
-            open_ones.append((gap, named))
-    if len(few) > TOLD_ALONE:
-        texts = [_all_with_few(few)]
-    else:
-        texts = [
-            message(
-                "section_weak",
-                "section {section} (course {course}) has only {count} points; {advised} or more "
-                "are advised",
-                **named,
-                count=count,
-                advised=ADVISED_POINTS,
-            )
-            for count, named in few
-        ]
-    if len(open_ones) > TOLD_ALONE:
-        texts.append(_all_with_gaps(open_ones))
-    else:
-        texts += [
-            message(
-                "section_gap",
-                "section {section} (course {course}) has no point over {gap_deg:.0f} deg of its "
-                "circumference: measure there",
-                **named,
-                gap_deg=gap,
-            )
-            for gap, named in open_ones
-        ]
+            gaps.append((gap, named))
+    kinds = (few, _with_few, _all_with_few), (gaps, _with_gap, _all_with_gaps)
+    texts = []
+    for found, of_one, of_all in kinds:
+        texts += [of_all(found)] if len(found) > TOLD_ALONE else [of_one(*one) for one in found]
     return of_points(job.points, texts)
 
 
-def _all_with_few(few):
+def _with_few(count, named):
     return message(
-        "sections_weak",
-        "{all} sections have fewer than {advised} points, {count} at least: {sections}; {advised} "
-        "or more are advised",
-        all=len(few),
-        count=min(count for count, _ in few),
-        sections=_listed(few),
+        "section_weak",
+        "section {section} (course {course}) has only {count} points; {advised} or more are "
+        "advised",
+        **named,
+        count=count,
         advised=ADVISED_POINTS,
     )
 
 
-def _all_with_gaps(open_ones):
+def _all_with_few(found):
+    return message(
+        "sections_weak",
+        "{all} sections have fewer than {advised} points, {count} at least: {sections}; {advised} "
+        "or more are advised",
+        all=len(found),
+        count=min(count for count, _ in found),
+        sections=_listed(found),
+        advised=ADVISED_POINTS,
+    )
+
+
+def _with_gap(gap_deg, named):
+    return message(
+        "section_gap",
+        "section {section} (course {course}) has no point over {gap_deg:.0f} deg of its "
+        "circumference: measure there",
+        **named,
+        gap_deg=gap_deg,
+    )
+
+
+def _all_with_gaps(found):
     return message(
         "sections_gap",
         "{all} sections have no point over a part of their circumference, {gap_deg:.0f} deg at "
         "most: {sections}; measure there",
-        all=len(open_ones),
-        gap_deg=max(gap for gap, _ in open_ones),
-        sections=_listed(open_ones),
+        all=len(found),
+        gap_deg=max(gap_deg for gap_deg, _ in found),
+        sections=_listed(found),
     )
 
 
-def _listed(ones):
+def _listed(found):
     """Names of sections with those of their courses, the first of them."""
     names = [
-        message("section_of_course", "{section} (course {course})", **named) for _, named in ones
+        message("section_of_course", "{section} (course {course})", **named) for _, named in found
     ]
     return list_some(names, SHOWN)
 

@@ -109,13 +109,13 @@ class Component:
     def height_covariance(self, zeta, other):
         """(n, m) h between heights (n,) and (m,) of a course."""
         if self.orders == "local":
-            return np.exp(-np.abs(np.subtract.outer(zeta, other)) / LOCAL_LENGTH)
+            return _fading(np.subtract.outer(zeta, other))
         return self.height_columns(zeta) @ self.height_columns(other).T
 
     def height_between(self, zeta, other):
         """(n,) h between each height (n,) of a course and the other (n,) beside it."""
         if self.orders == "local":
-            return np.exp(-np.abs(zeta - other) / LOCAL_LENGTH)
+            return _fading(zeta - other)
         return np.sum(self.height_columns(zeta) * self.height_columns(other), axis=1)
 
 
@@ -153,6 +153,11 @@ def log_covariance(smoothed=False):
     alike = WORKMANSHIP + SHRINKAGE * np.outer(welded, welded)
     np.fill_diagonal(alike, 1.0)
     return alike * np.outer(log_sd, log_sd)
+
+
+def _fading(apart):
+    """h of a dent between heights so far apart."""
+    return np.exp(-np.abs(apart) / LOCAL_LENGTH)
 
 
 def legendre(zeta, highest):

@@ -114,12 +114,13 @@ class FieldValues:
         """
         weights, of_places = rows @ self.weights, rows[:, : len(self._spots)]
         row, first, second, product = _pairs(of_places)
+        around = self._around(first, second)
         found = np.empty((len(COMPONENTS), len(weights)))
         sizes = self._field.amplitudes.variances_m2
         for index, (size, across) in enumerate(zip(sizes, self._across, strict=True)):
             found[index] = size * self._covariances.spread_alone(weights, index)
             found[index] -= 2 * np.einsum("rn,rn->r", weights, of_places @ across)
-            own = size * product * self._between(index, first, second)
+            own = size * product * self._between(index, first, second, around)
             found[index] += np.bincount(row, own, len(weights))
         return found
 
@@ -154,18 +155,22 @@ class FieldValues:
             found = found * (spots.course[:, None] == sites.course)
         return size * found
 
-    def _between(self, index, first, second):
+    def _around(self, first, second):
+        """{shape: (k,) c between places (k,) and others}."""
+        azimuth = self._spots.azimuth_rad
+        waves = oval_columns(azimuth)
+        return {
+            "mean": 1.0,
+            "oval": np.sum(waves[first] * waves[second], axis=1),
+            "seam": seam_correlation(azimuth[first] - azimuth[second], self._field.nominal_m),
+        }
+
+    def _between(self, index, first, second, around):
         """(k,) covariance between places (k,) and others by one component of unit variance."""
         one, spots = COMPONENTS[index], self._spots
         if one.shape == "weld":
             return np.sum(self._peaks[index][first] * self._peaks[index][second], axis=1)
-        found = one.height_between(spots.zeta[first], spots.zeta[second])
-        if one.shape == "oval":
-            waves = oval_columns(spots.azimuth_rad)
-            found = found * np.sum(waves[first] * waves[second], axis=1)
-        elif one.shape == "seam":
-            away = spots.azimuth_rad[first] - spots.azimuth_rad[second]
-            found = found * seam_correlation(away, self._field.nominal_m)
+        found = around[one.shape] * one.height_between(spots.zeta[first], spots.zeta[second])
         if not one.common:
             found = found * (spots.course[first] == spots.course[second])
         return found
