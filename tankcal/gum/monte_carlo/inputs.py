@@ -64,22 +64,26 @@ class Inputs:
 
     def draws(self, uniforms):
         """(draws, n) values x and coordinates e (or None) for (draws, n) uniform numbers."""
-        p = np.clip(uniforms, 2.0**-40, 1 - 2.0**-40)
-        coordinates = np.empty_like(p)
-        if self.factor is not None:
-            coordinates[:] = ndtri(p)
-            p = ndtr(coordinates @ self.factor.T)
-        else:
-            coordinates[:, self.normal] = ndtri(p[:, self.normal])
-        if self.transform is None:
-            return np.column_stack([d.quantile(p[:, j]) for j, d in self._numbered()]), None
-        for j, distribution in self._numbered():
-            if not self.normal[j]:
-                coordinates[:, j] = distribution.quantile(p[:, j]) - self.mean[j]
-        return self.mean + coordinates @ self.transform.T, coordinates
+        if self.transform is not None:
+            coordinates = self.coordinates(uniforms)
+            return self.mean + coordinates @ self.transform.T, coordinates
+        p = ndtr(ndtri(_inside(uniforms)) @ self.factor.T)
+        return np.column_stack(
+            [d.quantile(p[:, j]) for j, d in enumerate(self.distributions)]
+        ), None
 
-    def _numbered(self):
-        return enumerate(self.distributions)
+    def coordinates(self, uniforms):
+        """(draws, n) independent coordinates e, where there is a transform."""
+        found = _inside(uniforms)
+        for j, distribution in enumerate(self.distributions):
+            if not self.normal[j]:
+                found[:, j] = distribution.quantile(found[:, j]) - self.mean[j]
+        found[:, self.normal] = ndtri(found[:, self.normal])
+        return found
+
+
+def _inside(uniforms):
+    return np.clip(uniforms, 2.0**-40, 1 - 2.0**-40)
 
 
 def inputs_of(distributions, correlation=None):

@@ -1,6 +1,6 @@
 """The estimates of rows that are quadratic in a few inputs: means over independent point sets.
 
-u from the covariance of (d, forms), whose first block is exact; the ends by inverting the
+u from that of the linear part, exact, and the covariance of the forms; the ends by inverting the
 distribution function, known at three levels about each end, that quadratic.Lines estimates.
 Sources: JCGM 101:2008 7.6, 7.7; randomised point sets: Owen 1998.
 """
@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from tankcal.gum.monte_carlo.goal import as_good_as_plain, may_stop
+from tankcal.gum.monte_carlo.inputs import inputs_of
 from tankcal.gum.monte_carlo.linear import linear_law, shapes_of
 from tankcal.gum.monte_carlo.quadratic import RARE, Lines
 from tankcal.gum.monte_carlo.sobol import sobol_points
@@ -30,7 +31,7 @@ def table_estimates(model, ready, goal, progress):
     shortest interval lies far from the symmetric one, or plain draws would be as good. The ends of
     such a row are nan: another method has to find them.
     """
-    rows = model.in_coordinates(ready.transform)
+    rows, ready = _in_few_coordinates(model, ready)
     sets = _point_sets(ready, goal)
     forms = rows.forms(sets.reshape(-1, sets.shape[-1])).reshape(*sets.shape[:2], -1)
     shapes = shapes_of(ready)
@@ -38,7 +39,7 @@ def table_estimates(model, ready, goal, progress):
     levels = np.concatenate([SIDES * goal.tail, 1 - SIDES[::-1] * goal.tail])
     scaled = rows.jacobian * ready.coordinate_scale
     law = linear_law(scaled, ready.normal, shapes, levels)
-    moments = _moments(rows, ready, sets, forms)
+    moments = _moments(rows, ready, forms)
     found = _Ends(lines, law, levels, sets, forms)
     estimates, errors = np.full((2, 6, len(rows.value)), np.nan)  # what nobody fills shows
     estimates[:2], errors[:2] = _mean_and_error(moments)
@@ -61,9 +62,34 @@ def table_estimates(model, ready, goal, progress):
     return estimates, errors, draws, law.known.copy(), sound
 
 
+def _in_few_coordinates(model, ready):
+    """The rows in independent coordinates, with the inputs whose coordinates these are.
+
+    What is asked is the law of each row by itself. So normal coordinates are turned until all
+    forms lie in the first of them; of the others each row has a sum of its own, one more normal.
+    """
+    normal, transform = ready.normal, ready.transform
+    bent = np.any(model.hessians != 0, axis=(0, 1)) & normal
+    turn = np.linalg.qr(transform[np.ix_(bent, normal)].T).Q
+    if np.count_nonzero(normal) - turn.shape[1] < 2:
+        return model.in_coordinates(transform), ready
+    first = transform[:, normal] @ turn
+    nothing = np.zeros((len(normal), 1))
+    rows = model.in_coordinates(np.hstack([transform[:, ~normal], first, nothing]))
+    slopes = model.jacobian @ transform[:, normal]
+    slopes -= (slopes @ turn) @ turn.T
+    rows.jacobian[:, -1] = np.linalg.norm(slopes, axis=1)
+    others = [
+        one for one, is_normal in zip(ready.distributions, normal, strict=True) if not is_normal
+    ]
+    unit = ready.distributions[np.argmax(normal)]  # the coordinate of any normal input
+    return rows, inputs_of(others + [unit] * (turn.shape[1] + 1))
+
+
 def _point_sets(ready, goal):
     seeds = np.random.SeedSequence(goal.seed).spawn(SETS)
-    return np.stack([ready.draws(sobol_points(POINTS, len(ready.mean), seed))[1] for seed in seeds])
+    count = len(ready.mean)
+    return np.stack([ready.coordinates(sobol_points(POINTS, count, seed)) for seed in seeds])
 
 
 def _plain(goal, rows, ready, shapes, law):
@@ -87,8 +113,11 @@ def _mean_and_error(sets):
     return np.mean(sets, axis=0), error
 
 
-def _moments(rows, ready, sets, forms):
-    """(sets, 2, rows) mean and u: exact for the linear part, from the draws for what is added."""
+def _moments(rows, ready, forms):
+    """(sets, 2, rows) mean and u: exact for the linear part, from the draws for what is added.
+
+    The two are uncorrelated: the coordinates are symmetric about 0.
+    """
     sd = ready.coordinate_sd
     finite = np.isfinite(sd)
     exact = np.einsum("kaa,a->k", rows.hessians[:, finite][:, :, finite], sd[finite] ** 2)
@@ -96,21 +125,17 @@ def _moments(rows, ready, sets, forms):
     with np.errstate(invalid="ignore"):
         linear = np.where(rows.jacobian == 0, 0.0, rows.jacobian * sd)
     alone = np.sum(linear**2, axis=1)
-    # w' cov(forms) w + 2 j' cov(e, forms) w, both by one product
     middles = np.array([np.where(drawn, form.mean(axis=0), exact) for form in forms])
-    products = []
-    for e, form, middle in zip(sets, forms, middles, strict=True):
-        about = form - middle
-        products.append(np.vstack([2 * e.T @ about, about.T @ about]) / len(e))
-    found = np.empty((len(sets), 2, len(alone)))
+    abouts = forms - middles[:, None]
+    products = [about.T @ about / len(about) for about in abouts]
+    found = np.empty((len(forms), 2, len(alone)))
     for start in range(0, len(alone), ROWS):
         some = slice(start, start + ROWS)
         weights = rows.weights[some]
-        both = np.hstack([rows.jacobian[some], weights])
         found[:, 0, some] = middles @ weights.T + rows.value[some]
         for of_set, product in zip(found, products, strict=True):
-            variance = alone[some] + np.einsum("rk,rk->r", both @ product, weights)
-            of_set[1, some] = np.sqrt(np.maximum(variance, 0.0))
+            added = np.einsum("rk,rk->r", weights @ product, weights)
+            of_set[1, some] = np.sqrt(alone[some] + added)
     return found
 
 
