@@ -7,6 +7,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
+from tankcal.solver.compiled import is_worth_compiling
 from tankcal.solver.elimination import (
     add_own_cofactors,
     block_cofactors,
@@ -16,6 +17,7 @@ from tankcal.solver.elimination import (
     roots,
     through_reduced,
 )
+from tankcal.solver.sandwich import sandwich
 from tankcal.solver.threads import threads_for
 
 DENSE = 4e6  # numbers
@@ -48,8 +50,8 @@ class Factor:
             inverse, info = scipy.linalg.lapack.dpotri(self.lower, lower=1)
         if info:
             raise ValueError("a factor that was sound before cannot be inverted")
-        inverse = np.tril(inverse)
-        inverse += np.tril(inverse, -1).T
+        inverse = np.triu(inverse.T)  # row by row
+        inverse += np.triu(inverse, 1).T
         if self.tangent is not None:
             inverse = self.tangent.from_null_space(self.tangent.from_null_space(inverse).T)
         inverse *= self.scale
@@ -131,8 +133,12 @@ class Cofactors:
 
     def _cofactors(self, columns):
         normals = self.factor.normals
-        whitened = self.factor.whitened(through_reduced(self.plan, normals, columns))
-        q = whitened.T @ whitened
+        through = through_reduced(self.plan, normals, columns)
+        if len(columns) >= self.plan.reduced and is_worth_compiling(self.plan.rows):
+            q = sandwich(np.ascontiguousarray(through.T), self.reduced_cofactors)
+        else:
+            whitened = self.factor.whitened(through)
+            q = whitened.T @ whitened
         add_own_cofactors(self.plan, normals, columns, q)
         return q if self.datum is None else self._in_datum(q, columns, columns)
 

@@ -13,14 +13,12 @@ from tankcal.solver.compiled import compile_functions, is_worth_compiling
 def add_rows(plan, batch, w, jac, normals):
     """Add rows of a Batch of a Plan, w (n, m) and jac (n, m, K), to the Normals."""
     if is_worth_compiling():
-        run = compile_functions(loops, loops.COMPILED)
-        skip = 0 if batch.block is None else 3
-        run._add_squares(w, jac, skip, batch.first, batch.cuts, normals.t, normals.g)
-        if batch.block is not None:
-            run._add_blocks(
-                w, jac, batch.block, batch.place, batch.cuts, plan.starts,
-                normals.v, normals.wide, normals.b,
-            )  # fmt: skip
+        has = batch.block is not None
+        block, place = (batch.block, batch.place) if has else (batch.first, batch.first)
+        compile_functions(loops, loops.COMPILED)._add_rows(
+            w, jac, has, block.ravel(), batch.first, place, batch.cuts, plan.starts,
+            normals.v, normals.wide, normals.b, normals.t, normals.g,
+        )  # fmt: skip
         return
     f, columns = jac, batch.columns
     if batch.block is not None:

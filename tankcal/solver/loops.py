@@ -25,6 +25,7 @@ COMPILED = (
     "_product",
     "_add_squares",
     "_add_blocks",
+    "_add_rows",
     "_root",
     "_forward",
     "_sizes",
@@ -38,6 +39,13 @@ COMPILED = (
     "_cofactors",
     "_leverage",
 )
+
+
+def _add_rows(w, jac, has_block, block, first, place, cuts, starts, v, wide, b, t, g):
+    """Add rows of a Batch to the Normals; without blocks anything stands for block and place."""
+    _add_squares(w, jac, 3 if has_block else 0, first, cuts, t, g)
+    if has_block:
+        _add_blocks(w, jac, block, place, cuts, starts, v, wide, b)
 
 
 def _add_squares(w, jac, skip, first, cuts, t, g):

@@ -24,7 +24,7 @@ class Refusing:
         raise OSError(30, "Read-only file system")
 
 numba.core.caching.tempfile = Refusing
-import tankcal.camera.imaging, tankcal.solver.loops, tankcal.solver.series
+import tankcal.camera.imaging, tankcal.solver.loops, tankcal.solver.sandwich, tankcal.solver.series
 from networks import by_total_station, photographed
 from tankcal.solver.compiled import compile_functions
 from tankcal.survey.network import adjust
@@ -32,8 +32,10 @@ from tankcal.survey.network import adjust
 for make in (photographed, by_total_station):
     adjusted = adjust(make()[0], datum="inner")
     assert adjusted.residuals and adjusted.point_covariances_m2.any()
+    assert adjusted.covariance_m2().any()
 rooms = {
     tankcal.solver.loops: "COMPILED",
+    tankcal.solver.sandwich: "COMPILED",
     tankcal.solver.series: "COMPILED",
     tankcal.camera.imaging: "_COMPILED",
 }

@@ -113,8 +113,10 @@ def test_loops_and_arrays_agree(make, compiler, monkeypatch):
     survey = make()[0]
     found = []
     for choice in (True, False):
-        for room in (tankcal.solver.elimination, tankcal.camera.imaging):
+        solver = tankcal.solver
+        for room in (solver.elimination, solver.cofactors, tankcal.camera.imaging):
             monkeypatch.setattr(room, "is_worth_compiling", lambda rows=0, choice=choice: choice)
+        for room in (solver.elimination, solver.sandwich, tankcal.camera.imaging):
             monkeypatch.setattr(room, "compile_functions", compiler)
         found.append(adjust(survey, datum="inner"))
         assert found[-1].residuals  # leverages too

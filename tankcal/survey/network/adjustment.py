@@ -84,7 +84,8 @@ def _adjusted(survey, problem, datum, solved):
     if survey.photos is not None:
         refuse_worthless_cameras(survey, problem, solution)
     chi2, dof = _scatter_of_repeats(problem)
-    solution = replace(solution, chi2=solution.chi2 + chi2, rows=solution.rows + dof)
+    if dof:
+        solution = replace(solution, chi2=solution.chi2 + chi2, rows=solution.rows + dof)
     return Adjusted(survey, problem, solution)
 
 

@@ -1,6 +1,6 @@
 """From a survey to a least-squares problem: what is unknown, and in which column it stands."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -293,7 +293,7 @@ def _interior(survey):
     if known:
         index, value, sd = np.array(known).T
         observed = [KnownUnknowns(value, sd, "interior", index.astype(int))]
-    return table, np.append(values, 0.0), np.append(free, False).astype(bool), observed
+    return table, np.array([*values, 0.0]), np.array([*free, False]), observed
 
 
 def _known_nuisances(survey):
@@ -346,17 +346,13 @@ def _image_groups(survey, used, layout, reduced, table):
 
 def _state(survey, centre, values):
     photos, systems = survey.photos, survey.systems
-    state = State(
-        xyz_m=survey.xyz_m - centre,
-        interior=values,
-        nuisance={of: one.value for of, one in survey.nuisances.items()},
-    )
+    found = {"nuisance": {of: one.value for of, one in survey.nuisances.items()}}
     if photos is not None:
-        state = replace(state, photo_xyz_m=photos.xyz_m - centre, rotation=photos.rotation)
+        found |= {"photo_xyz_m": photos.xyz_m - centre, "rotation": photos.rotation}
     if systems:
         rotation = np.array([system.rotation for system in systems])
         scale = np.array([system.scale for system in systems])
         shift = np.array([system.shift_m for system in systems])
         shift = shift + (1 + scale)[:, None] * (rotation @ centre)
-        state = replace(state, system=rotation, system_shift_m=shift, system_scale=scale)
-    return state
+        found |= {"system": rotation, "system_shift_m": shift, "system_scale": scale}
+    return State(xyz_m=survey.xyz_m - centre, interior=values, **found)
