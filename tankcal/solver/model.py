@@ -279,8 +279,8 @@ def _structure_by_loops(reduced, blocks, raw):
     """The same by compiled loops."""
     run = compile_functions(series, series.COMPILED)
     edges = _edges(reduced, raw)
-    widths = np.diff(edges)
-    piece_of = np.repeat(np.arange(len(widths)), widths)
+    widths = edges[1:] - edges[:-1]
+    piece_of = np.arange(len(widths)).repeat(widths)
     together = np.zeros((blocks, len(widths)), dtype=bool)
     for _, _, _, block, cuts, first in raw:
         if block is not None:
@@ -305,7 +305,7 @@ def _edges(reduced, raw):
     for _, _, _, block, cuts, first in raw:
         if block is not None:
             begins[first] = True
-            begins[first + np.diff(cuts)] = True
+            begins[first + (cuts[1:] - cuts[:-1])] = True
     return begins.nonzero()[0]
 
 

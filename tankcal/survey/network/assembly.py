@@ -205,7 +205,7 @@ def _refuse_poor_photos(survey):
             count += one.rows * np.bincount(one.photo, minlength=len(count))
     if photos.fixed is not None:
         count += np.repeat(photos.fixed, (1, 1, 1, 3), axis=1).sum(axis=1)
-    poor = np.flatnonzero(count < 6)
+    poor = (count < 6).nonzero()[0]
     if len(poor):
         told = ", ".join(f"{photos.names[i]} ({rays[i]})" for i in poor)
         raise SolutionError(
@@ -229,12 +229,12 @@ def _others(survey, used, centre):
         for name in one.ties:
             keep &= used[getattr(one, name)]
         holds = one.exact
-        if holds.any() and (sharp := np.flatnonzero(keep & holds & one.in_use)).size:
+        if holds.any() and (sharp := (keep & holds & one.in_use).nonzero()[0]).size:
             taken = one.taken(sharp).relative(centre)
             exact.append(Held(taken, *taken.conditions(), number, sharp))
             if holds.all():
                 continue
-        rows = np.flatnonzero(keep & ~holds & ~is_in_block(survey, number))
+        rows = (keep & ~holds & ~is_in_block(survey, number)).nonzero()[0]
         groups.append((one if len(rows) == len(one) else one.taken(rows)).relative(centre))
         sources.append(number)
         rows_of.append(rows)
@@ -275,7 +275,7 @@ def _interior(survey):
                     camera=settings.name,
                 )
             )
-        mine = np.flatnonzero(photos.camera == camera)
+        mine = (photos.camera == camera).nonzero()[0]
         wanted = [[k for k in range(13) if settings.scope[k] == scope] for scope in SCOPES]
         each = [(shared, mine, wanted[1]), ({}, mine, wanted[2])]
         each += [({}, [photo], wanted[3]) for photo in mine] if wanted[3] else []
@@ -300,7 +300,7 @@ def _known_nuisances(survey):
     """Scales and offsets of instruments with an sd: weighted unknowns."""
     observed = []
     for of, one in survey.nuisances.items():
-        index = np.flatnonzero(one.sd > 0)
+        index = (one.sd > 0).nonzero()[0]
         if len(index):
             observed.append(KnownUnknowns(one.value[index], one.sd[index], of, index))
     return observed
@@ -332,14 +332,14 @@ def _image_groups(survey, used, layout, reduced, table):
             order = order[used[images.point[order]]]
         of_order = key[order]
         if (of_order[1:] < of_order[:-1]).any():
-            order = order[np.argsort(of_order, kind="stable")]
+            order = order[of_order.argsort(kind="stable")]
         eliminated = np.count_nonzero(key[order] < last)
         part = np.minimum(np.arange(len(order)), eliminated) // PART
         part[eliminated:] += 1
         of_photo = part * len(survey.photos.names) + images.photo[order]
         of_photo = of_photo.astype(np.min_scalar_type(of_photo.max(initial=0)))
-        order = order[np.argsort(of_photo, kind="stable")]
-        active = np.flatnonzero((left < layout.interior.size - 1).any(axis=0))
+        order = order[of_photo.argsort(kind="stable")]
+        active = (left < layout.interior.size - 1).any(axis=0).nonzero()[0]
         active = active[(layout.interior[left[:, active]] >= 0).any(axis=0)]
         yield images.taken(order, form=form, active=active, interior_of=table), order
 

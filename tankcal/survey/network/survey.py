@@ -208,7 +208,7 @@ class Survey:
         if len(forms) == 1:
             return [(form, np.arange(len(images))) for form in forms]
         camera = self.photos.camera[images.photo]
-        return [(form, np.flatnonzero(np.isin(camera, mine))) for form, mine in forms.items()]
+        return [(form, np.isin(camera, mine).nonzero()[0]) for form, mine in forms.items()]
 
     def values_of_points(self):
         """(points,) how many values, fixed coordinates among them, speak of each point."""

@@ -56,19 +56,19 @@ def layout_of(survey, eliminated, used, interior_free, table):
     own = _of_one_photo(table, interior_free)
     mine = own.any(axis=0)
     interior = columns(interior_free & ~mine)
-    both = columns(np.hstack([free_photos, own[:, mine]]))  # each photo's own together
+    both = columns(np.concatenate([free_photos, own[:, mine]], axis=1))  # each photo's own together
     of_photos, interior[mine] = both[:, :6], both[:, 6:].max(axis=0, initial=-1)
     nuisance = {of: columns(one.sd != 0) for of, one in survey.nuisances.items()}
     system = columns(free_system)
     of_points = columns(free_points & ~eliminated[:, None])
     reduced = next_column
-    last = np.flatnonzero(eliminated)
+    last = eliminated.nonzero()[0]
     if survey.image_points is not None:  # points in the same photos, or nearly, next to one another
         mark = 10.0 ** (-12 * np.arange(len(free_photos)) / max(len(free_photos) - 1, 1))
         seen = np.bincount(
             survey.image_points.point, weights=mark[survey.image_points.photo], minlength=points
         )
-        last = last[np.argsort(seen[last], kind="stable")]
+        last = last[seen[last].argsort(kind="stable")]
     of_points[last] = next_column + np.arange(3 * len(last)).reshape(-1, 3)
     return Layout(of_points, of_photos, interior, nuisance, system), reduced
 

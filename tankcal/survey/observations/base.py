@@ -208,7 +208,8 @@ class Observations:
         Three of each point of `ties`, one of each of `nuisances`.
         """
         points = [layout.points[getattr(self, name)] for name in self.ties]
-        return np.hstack([*points, *(one[:, None] for one in self._each(layout.nuisance, -1))])
+        others = (one[:, None] for one in self._each(layout.nuisance, -1))
+        return np.concatenate([*points, *others], axis=1)
 
     def nuisance(self, state):
         """Values (n,) of each of `nuisances`; 0 where a row has none."""

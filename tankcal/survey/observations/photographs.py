@@ -63,7 +63,7 @@ class ImageCoordinates(Observations):
     def columns(self, layout):
         """Point (3), photo (6), interior parameters (k)."""
         interior = layout.interior[self.interior_of[:, self.active]]
-        of_photo = np.hstack([layout.photos, interior]).astype(np.int32)
+        of_photo = np.concatenate([layout.photos, interior], axis=1).astype(np.int32)
         found = np.empty((len(self), 3 + of_photo.shape[1]), dtype=np.int32)
         found[:, :3] = layout.points.take(self.point, axis=0)
         found[:, 3:] = of_photo.take(self.photo, axis=0)
