@@ -63,9 +63,8 @@ def tank(rows, kinds=ORDINARY, factor=1.0, count=INPUTS):
         hessian[i, j] += value / 2
         hessian[j, i] += value / 2
     weights = np.column_stack([pair[3] for pair in pairs])
-    sizes = factor * np.array(
-        [2e-4, 1.0, 1e-3, 0.05, 0.01] + [1e-3] * COURSES + [1.0] * form.shape[1]
-    )
+    sizes = np.ones(count)
+    sizes[: 5 + COURSES] = [2e-4, 1.0, 1e-3, 0.05, 0.01] + [1e-3] * COURSES
     dof, kinds = {0: 5.0, 7: 3.0}, kinds + ("normal",) * (count - len(kinds))
     inputs = [
         Normal(u) if kind == "normal" else standard(u, kind, dof=dof.get(i, np.inf))
