@@ -68,9 +68,8 @@ class Inputs:
             coordinates = self.coordinates(uniforms)
             return self.mean + coordinates @ self.transform.T, coordinates
         p = ndtr(ndtri(_inside(uniforms)) @ self.factor.T)
-        return np.column_stack(
-            [d.quantile(p[:, j]) for j, d in enumerate(self.distributions)]
-        ), None
+        numbered = enumerate(self.distributions)
+        return np.column_stack([one.quantile(p[:, j]) for j, one in numbered]), None
 
     def coordinates(self, uniforms):
         """(draws, n) independent coordinates e, where there is a transform."""

@@ -79,10 +79,8 @@ def _in_few_coordinates(model, ready):
     slopes = model.jacobian @ transform[:, normal]
     slopes -= (slopes @ turn) @ turn.T
     rows.jacobian[:, -1] = np.linalg.norm(slopes, axis=1)
-    others = [
-        one for one, is_normal in zip(ready.distributions, normal, strict=True) if not is_normal
-    ]
-    unit = ready.distributions[np.argmax(normal)]  # the coordinate of any normal input
+    others = [ready.distributions[j] for j in np.flatnonzero(~normal)]
+    unit = ready.distributions[np.argmax(normal)]  # of any normal input the coordinate is the same
     return rows, inputs_of(others + [unit] * (turn.shape[1] + 1))
 
 
