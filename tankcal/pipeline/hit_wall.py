@@ -82,13 +82,14 @@ def sight_wall(job, adjustment, progress):
 
 def _as_points(job, sighting):
     """The job with the hits that count as its points, all on one side of the wall, and then its
-    targets.
+    targets; the sighting without the covariance of its points, which may be half a gigabyte.
     """
     sighting = _on_one_side(job, sighting)
     counted = np.flatnonzero(~job.hits.check)
     used = take_points(sighting.points, counted)
     if sighting.beside is not None:
         used = sighting.beside.after(used, sighting.by_poses[coordinates_of(counted)])
+    sighting = replace(sighting, points=replace(sighting.points, covariance_m2=None))
     return replace(job, points=s_transform(used)), sighting
 
 

@@ -308,6 +308,19 @@ def test_two_degrees_of_freedom_have_no_u_but_an_interval():
     assert found.high[0] == pytest.approx(stats.t(2).ppf(0.975), abs=5e-3)
 
 
+def test_rows_without_second_derivatives_are_those_of_the_linear_law():
+    """Closed form: a sum of normal inputs, 1.96 u both ways; no form at all."""
+    none = np.zeros((0, 2, 2)), np.zeros((3, 0))
+    jacobian = np.array([[3.0, 4.0], [1.0, 0.0], [0.0, 0.0]])
+    found = simulate(
+        QuadraticRows(np.full(3, 7.0), jacobian, *none, np.zeros(2)), [Normal(1.0)] * 2
+    )
+    u = np.array([5.0, 1.0, 0.0])
+    assert found.u == pytest.approx(u, abs=1e-12)
+    assert found.high - 7.0 == pytest.approx(1.959964 * u, abs=1e-6)
+    assert 7.0 - found.shortest_low == pytest.approx(1.959964 * u, abs=1e-6)
+
+
 def test_rows_that_do_not_vary_have_no_uncertainty():
     model = QuadraticRows(
         np.array([0.0, 5.0]), np.array([[0.0], [1.0]]), np.ones((1, 1, 1)), np.zeros((2, 1)),

@@ -131,7 +131,7 @@ class Lines:
         targets, linear  (block, levels) counted from V0; each P(L <= linear) is its level, added
         Also (block,) the part of draws in which the parabola turns too near.
         """
-        e, forms = (part.reshape(-1, part.shape[-1]) for part in draws)
+        e, forms = map(np.concatenate, draws)
         place = e @ self.direction[block].T
         lin = e @ self.rows.jacobian[block].T
         value = forms @ self.rows.weights[block].T

@@ -33,7 +33,7 @@ def table_estimates(model, ready, goal, progress):
     """
     rows, ready = _in_few_coordinates(model, ready)
     sets = _point_sets(ready, goal)
-    forms = rows.forms(sets.reshape(-1, sets.shape[-1])).reshape(*sets.shape[:2], -1)
+    forms = np.stack([rows.forms(e) for e in sets])
     shapes = shapes_of(ready)
     lines = Lines(rows, ready.normal, shapes, ready.coordinate_scale)
     levels = np.concatenate([SIDES * goal.tail, 1 - SIDES[::-1] * goal.tail])
