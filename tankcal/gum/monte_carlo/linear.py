@@ -7,16 +7,18 @@ Sources: Gil-Pelaez 1951; Davies 1973 (the sum instead of the integral); JCGM 10
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.special import expit, ndtri
 
 SPACING = 0.0025  # of a table of phi, in units of 1/scale
-SHORT, LONG = 1 << 14, 1 << 17  # values of such a table: FEWEST terms need no more than the first
+SHORT, LONG = 1 << 14, 1 << 18  # values of such a table: FEWEST terms need no more than the first
 FEWEST, MOST = 40, 5120  # terms of the sum
 LEAST = 1e-6  # what the terms left out may be worth, as a probability
 SMOOTH = 1e-6  # phi at the end of a short table of what has neither kinks nor steps
 CLOSE = 1e-4  # last step of Newton, in scales: the next one would be some 1e-8
+STEP = 1e-6  # of a probability over which the density of an input that acts alone is taken
 BLOCK, ROWS = 1 << 18, 256  # numbers held at once, but of so many rows at least
 AT_ONCE = 8  # terms of which the factors are computed, so that they stay in the processor's cache
 
@@ -29,6 +31,7 @@ class Shape:
     value, below  (m,) values and the probability below each
     density       (m,) at the values; None where it has kinks or steps, which phi does not forget
     reach         value beyond which the density no longer matters for the sum over k
+    end, rest     t scale where the longest table of phi ends, and how large phi is there
     second, fourth  moments about the mean, within probabilities 1e-13 and 1 - 1e-13
     """
 
@@ -49,6 +52,20 @@ class Shape:
         phi = self._distribution.characteristic(SPACING / self._scale * np.arange(length))
         self._phi = np.asarray(phi, dtype=float)
         self._steps = np.diff(self._phi)
+
+    end = (LONG - 1) * SPACING
+
+    @cached_property
+    def rest(self):
+        """The largest |phi| over the last wave of the longest table."""
+        t = self.end - np.linspace(0.0, 2 * np.pi, 64)
+        return float(np.max(np.abs(self._distribution.characteristic(t / self._scale))))
+
+    def law(self, levels):
+        """Quantiles (levels,) and densities at them, from the mean in units of the scale."""
+        ends = levels + STEP * levels * (1 - levels) * np.array([[-1.0], [0.0], [1.0]])
+        low, middle, high = self._distribution.quantile(ends) / self._scale
+        return middle - self._distribution.mean / self._scale, (ends[2] - ends[0]) / (high - low)
 
     def characteristic(self, t, factor=1.0):
         """E cos(factor t e), neither below 0, linear between the values of the table; 0 beyond."""
@@ -100,8 +117,14 @@ def linear_law(coefficients, normal, shapes, levels):
     density = np.full_like(quantile, np.nan)
     quantile[known] = own[known, None] * ndtri(levels)
     density[known] = np.exp(-(ndtri(levels) ** 2) / 2) / np.sqrt(2 * np.pi) / own[known, None]
+    alone = (own == 0) & (count == 1)
+    for j in others:
+        rows = np.flatnonzero(alone & (coefficients[:, j] != 0))
+        value, steepness = shapes[j].law(levels)
+        size = np.abs(coefficients[rows, j, None])
+        quantile[rows], density[rows], known[rows] = size * value, steepness / size, True
     chosen = [shapes[j] for j in others]
-    pending, terms = np.flatnonzero(count > 0), FEWEST
+    pending, terms = np.flatnonzero((count > 0) & ~alone), FEWEST
     while len(pending) and terms <= MOST:
         left = []
         for block in np.array_split(pending, 1 + len(pending) // max(BLOCK // terms, ROWS)):
@@ -138,7 +161,13 @@ class _Sums:
             self.phi[some : some + AT_ONCE, 0] = phi
         np.divide(self.phi[:, 0], order, out=self.phi[:, 1])
         last = np.max(np.abs(self.phi[-8:, 0]), axis=0)
-        self.converged = last / (np.pi * order[-1] * self.spacing) < LEAST
+        left = last / (order[-1] * self.spacing)
+        for shape, part in zip(shapes, sizes, strict=True):
+            end = np.divide(shape.end, part, out=np.full_like(part, np.inf), where=part > 0)
+            cut = end * self.scale < order[-1] * self.spacing  # terms beyond its table are 0 here
+            rest = shape.rest * np.exp(-0.5 * (own[cut] * end[cut]) ** 2)
+            left[cut] = np.maximum(left[cut], rest / (end[cut] * self.scale[cut]))
+        self.converged = left < np.pi * LEAST
 
     def only(self, chosen):
         """Keep the chosen rows."""
