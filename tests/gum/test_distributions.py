@@ -44,6 +44,13 @@ OTHER_PROGRAM = {
 }
 
 
+def test_students_t_has_no_ends():
+    """Closed form: for any number of degrees of freedom, among few probabilities and many."""
+    for dof in (0.5, 1, 2, 3, 4, 5, 8, 30, 31, 1e6):
+        assert StudentT(1.0, dof=dof).quantile([0.0, 0.5, 1.0]).tolist() == [-np.inf, 0.0, np.inf]
+        assert (student_quantile(np.zeros(1000), dof) == -np.inf).all()
+
+
 @pytest.mark.parametrize("one", ALL[:6], ids=lambda one: f"{one.name}-{one.dof:g}")
 def test_quantiles_and_sd_are_those_of_scipy(one):
     """Truth: another program, on the lower half, where its quantiles keep their digits."""
