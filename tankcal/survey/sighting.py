@@ -118,7 +118,8 @@ class Sighting:
     Attributes
     ----------
     points : Points
-        Of all n hits; those that are only compared are among them.
+        Of all n hits; those that are only compared are among them. Of a `Result` without their
+        covariance, which may be half a gigabyte: `sight` makes it of hits and poses.
     poses : Poses
     pose : ndarray of int, shape (n,)
         Of each hit.

@@ -25,6 +25,7 @@ from tankcal.cli.set_aside import lines_set_aside
 from tankcal.pipeline.cause_correlations import told_causes
 from tankcal.pipeline.hit_wall import take_points
 from tankcal.survey import adjust_survey, wall_points
+from tankcal.survey.sighting import sight
 
 FOOT, SLOPE, HEIGHT = (1.0, -0.5), (0.002, -0.001), 8.0
 STATION = np.array([0.0, 0.0, 1.5])
@@ -207,7 +208,7 @@ def test_hits_after_the_network_are_named_points_in_it(tmp_path, beside):
     parts.tables["targets"] += [[name] for name in beside]
     named = tankcal.load(write_folder(tmp_path / "named", parts))
     points = wall_points(adjust_survey(named.measurements), named.measurements, "inside")
-    count, found = len(rows) + len(beside), hits.sighting.points
+    count, found = len(rows) + len(beside), sight(hits.job.hits, hits.sighting.poses).points
     if beside:
         found = hits.sighting.beside.after(found, hits.sighting.by_poses)
     # the frames differ: inner constraints hold all points there, the stations and targets here
@@ -423,7 +424,7 @@ def test_hits_that_are_only_compared(tmp_path):
 
 def test_points_taken_keep_their_covariance(tmp_path):
     result = run(tmp_path, parts_of(tool=NOISY, seed=1))
-    whole = result.sighting.points
+    whole = sight(result.job.hits, result.sighting.poses).points
     some = take_points(whole, np.array([3, 0]))
     assert some.names == (whole.names[3], whole.names[0])
     np.testing.assert_array_equal(some.covariance_m2[:3, 3:], whole.covariance_m2[9:12, :3])
