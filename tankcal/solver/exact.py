@@ -19,6 +19,7 @@ from tankcal.errors import SolutionError
 DEPENDENT = 1e-9  # pivot of a row, all rows of length one: below it the row follows from others
 CONTRADICTION = 1e-6  # m or rad, what a dependent row may be off: more than typed digits allow
 CLOSED = 1e-9  # step that closes the conditions, in what it changes in the rows
+ROUNDED = 1e-9  # m or rad, of conditions that are off by rounding where steps no longer shrink
 ROUNDS = 25
 NAMES_SHOWN = 6
 
@@ -55,6 +56,7 @@ class Conditions:
 
     def closed(self, state, scale, strict=False):
         """The nearest state at which the conditions hold; None, or an error, when there is none."""
+        before = np.inf
         for _ in range(ROUNDS):
             c, derivatives = self.evaluate(state)
             if not np.isfinite(c).all() or not np.isfinite(derivatives).all():
@@ -64,9 +66,12 @@ class Conditions:
             whole = np.zeros(self.model.unknowns)
             whole[: self.reduced] = scale * step
             state = self.model.moved(state, self.model.in_datum(state, whole))
-            if np.linalg.norm(step) < CLOSED:
+            size = np.linalg.norm(step)
+            off = np.abs(c[tangent.independent]).max(initial=0.0)
+            if size < CLOSED or (size > before / 2 and off < ROUNDED):
                 self._refuse_contradiction(tangent, state)
                 return state
+            before = size
         if strict:
             raise SolutionError(self._in_words(self.evaluate(state)[0], range(self.rows)))
         return None

@@ -10,7 +10,7 @@ from test_network import whole_matrix
 
 from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import angles_of, apply_small_rotation, rotation_of_angles
-from tankcal.survey.network import Instrument, System, adjust, snoop
+from tankcal.survey.network import Instrument, Survey, System, adjust, snoop
 from tankcal.survey.observations import (
     Azimuths,
     ControlCoordinates,
@@ -250,6 +250,25 @@ def test_contradictions_are_reported(survey):
     )  # fmt: skip
     with pytest.raises(SolutionError, match=r"held exactly contradict one another"):
         adjust(replace(survey, observations=(*survey.observations, triangle)))
+
+
+@pytest.mark.parametrize("away_m", [100.0, 1000.0, 5000.0])
+def test_exact_values_hold_to_rounding_however_far_they_reach(away_m):
+    """Closed form: an azimuth to a far mark, held exactly, moves a station across the sight alone.
+
+    Its rounding, 4e-16 rad, is 2e-8 of a column of 0.1 mm at 5 km: such surveys were refused for
+    values that contradict one another by 4e-16.
+    """
+    xyz, fixed = np.zeros((2, 3)), np.array([[False] * 3, [True] * 3])
+    control = ControlCoordinates(np.zeros(3), np.full(3, 1e-4), np.zeros(3, int), np.arange(3))
+    for azimuth in np.linspace(0.1, 6.2, 40):
+        xyz[1] = away_m * np.array([np.sin(azimuth), np.cos(azimuth), 0.1])
+        held = Azimuths(np.array([azimuth + 1e-7]), np.zeros(1), np.zeros(1, int), np.ones(1, int))
+        found = adjust(Survey(("S", "FAR"), xyz, fixed, observations=(control, held))).xyz_m
+        x, y, _ = found[1] - found[0]
+        assert abs(np.angle(np.exp(1j * (np.arctan2(x, y) - azimuth - 1e-7)))) < 2e-15
+        across = np.array([-np.cos(azimuth), np.sin(azimuth), 0.0]) * away_m * 1e-7
+        assert found[0] == pytest.approx(across, abs=1e-8)
 
 
 def test_impossible_exact_values_are_refused(survey):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from networks import tank_points
+from networks import photographed, tank_points
 
 from tankcal.camera.model import Form, distort_image_points
 from tankcal.errors import SolutionError
@@ -159,6 +159,14 @@ def test_photos_from_one_place_place_no_points():
     except SolutionError:
         return
     assert "point P1 is hardly determined" in " ".join(find_hardly_determined(found))
+
+
+def test_a_camera_that_took_no_photo_has_no_unknowns():
+    """Property: nothing changes; its free parameters were refused, by a traceback."""
+    survey = photographed()[0]
+    one = survey.cameras[0]
+    more = replace(survey, cameras=(*survey.cameras, replace(one, name="spare")))
+    assert adjust(more).xyz_m.tolist() == adjust(survey).xyz_m.tolist()
 
 
 def test_a_camera_without_c_is_refused():

@@ -267,6 +267,9 @@ def _interior(survey):
     table = np.full((len(photos.names), 13), -1)
     values, free, known, shared = [], [], [], {}
     for camera, settings in enumerate(survey.cameras):
+        mine = (photos.camera == camera).nonzero()[0]
+        if not len(mine):
+            continue
         if settings.scope[0] == "off" or not settings.values[0] > 0:
             raise SolutionError(
                 message(
@@ -275,7 +278,6 @@ def _interior(survey):
                     camera=settings.name,
                 )
             )
-        mine = (photos.camera == camera).nonzero()[0]
         wanted = [[k for k in range(13) if settings.scope[k] == scope] for scope in SCOPES]
         each = [(shared, mine, wanted[1]), ({}, mine, wanted[2])]
         each += [({}, [photo], wanted[3]) for photo in mine] if wanted[3] else []
