@@ -218,3 +218,15 @@ class Cofactors:
                     self.plan, batch, batch.of(jac), self.reduced_cofactors, cross, cofactors
                 )
         return out
+
+    def leverage_of_datum(self, columns, jac):
+        """What the datum adds to J Q J' of rows (n, m), columns (n, K): J (T Q T' - Q) J'.
+
+        It is nothing but for rows that feel a motion of the whole that no other row holds.
+        """
+        if self.datum is None:
+            return np.zeros(jac.shape[:2])
+        null_space, h, m = self.datum
+        free, across = (np.vstack([part, np.zeros((1, part.shape[1]))]) for part in (null_space, h))
+        by_free, by_h = (np.einsum("nmk,nkd->nmd", jac, part[columns]) for part in (free, across))
+        return np.einsum("nmd,nmd->nm", by_free @ m - 2 * by_h, by_free)

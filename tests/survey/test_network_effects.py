@@ -10,7 +10,7 @@ import tankcal.survey.network.reliability
 from tankcal.camera.model import PARAMETERS
 from tankcal.errors import SolutionError
 from tankcal.solver.effects import cofactors_within, responses
-from tankcal.survey.network import Instrument, adjust, correlations, snoop
+from tankcal.survey.network import Instrument, Survey, adjust, correlations, snoop
 from tankcal.survey.network.datum import depends_on_datum
 from tankcal.survey.network.quality import compare_left_out
 from tankcal.survey.observations import (
@@ -231,3 +231,25 @@ def test_cofactors_of_observation_are_rows_times_responses(datum):
         np.testing.assert_allclose(
             cofactors_within(solution.cofactor, k, rows), expected, atol=1e-9
         )
+
+
+@pytest.mark.parametrize("over", [None, np.array([0, 1, 2])])
+def test_a_reading_set_aside_is_judged_by_the_covariance_that_is_told(over):
+    """Second method: an azimuth that nothing else holds, under inner constraints; by J C J'."""
+    rng = np.random.default_rng(3)
+    xyz = rng.uniform(-10, 10, (7, 3))
+    start, end = np.triu_indices(7, 1)
+    length = np.linalg.norm(xyz[end] - xyz[start], axis=1) + 1e-3 * rng.normal(size=len(start))
+    tapes = Distances(length, np.full(len(start), 1e-3), start, end, np.full(len(start), -1))
+    x, y, _ = xyz[5] - xyz[2]
+    ends = np.array([2]), np.array([5])
+    aside = Azimuths(np.array([np.arctan2(x, y)]) + 3e-4, np.full(1, 1e-4), *ends, use=np.zeros(1))
+    names = tuple(f"P{i}" for i in range(7))
+    found = adjust(Survey(names, xyz, observations=(tapes, aside)), datum="inner", over=over)
+    x, y, _ = found.xyz_m[5] - found.xyz_m[2]
+    by_end = np.array([y, -x, 0.0]) / (x * x + y * y)
+    by_both = np.append(-by_end, by_end)
+    variance = 1e-8 + by_both @ found.covariance_m2([2, 5]) @ by_both
+    told = found.residuals[1]
+    assert told.w[0, 0] == pytest.approx(told.residual[0, 0] / np.sqrt(variance), rel=1e-6)
+    assert variance > 1.01e-8

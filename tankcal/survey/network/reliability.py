@@ -167,7 +167,8 @@ def _table(problem, solution, number, delta0):
     v = np.empty((len(one), one.rows))
     jac = np.empty((*v.shape, columns.shape[1]))
     whole.fill(solution.unknowns, v, jac)
-    leverage = solution.cofactor.leverage(number, jac)
+    leverage, aside = solution.cofactor.leverage(number, jac), use == 0
+    leverage[aside] += solution.cofactor.leverage_of_datum(columns[aside], jac[aside])
     share = use[:, None]
     r = 1.0 - share * leverage
     variance = np.where(share > 0, r, 1.0 + leverage)
