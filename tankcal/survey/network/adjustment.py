@@ -78,7 +78,7 @@ def _adjusted(survey, problem, datum, solved):
             "and_hanging",
             "{error}{datum}",
             error=error.args[0],
-            datum=weak_datum_sentence(problem),
+            datum="" if datum == "inner" else weak_datum_sentence(problem),
         )
         raise SolutionError(text) from error
     if survey.photos is not None:
