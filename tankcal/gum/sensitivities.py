@@ -95,9 +95,13 @@ def outputs_of(model, x):
 def _differences(model, x, u):
     """The first sound differences of each sensitivity, over ever smaller steps."""
     middle = outputs_of(model, x)
-    chosen = None
+    chosen = reach = None
     for share in _SHARES:
-        now = _differences_over(model, x, u, middle, _steps(x, u) * share)
+        steps = _steps(x, u) * share
+        coarse, bend = _central(model, x, middle, steps)
+        if reach is None:  # where the slope is zero a model may still change within u
+            reach = (np.abs(coarse) + np.abs(bend) / 2) * u
+        now = _differences_over(model, x, u, middle, steps, coarse, bend, reach)
         if chosen is None:
             chosen = now
         better = now.sound & ~chosen.sound
@@ -111,12 +115,11 @@ def _differences(model, x, u):
     return chosen
 
 
-def _differences_over(model, x, u, middle, steps):
-    coarse, bend = _central(model, x, middle, steps)
+def _differences_over(model, x, u, middle, steps, coarse, bend, reach):
     fine, finer_bend = _central(model, x, middle, steps / 2)
     slopes = fine + (fine - coarse) / 3
     rounding = _ROUNDING * np.abs(middle)[:, None] / steps
-    allowed = _AGREEMENT * _total(slopes, u)
+    allowed = _AGREEMENT * np.maximum(_total(slopes, u), reach)
     curved = np.abs(fine - coarse)
     # twice the mean slope of a kink stays when the step is halved; that of a curve is halved
     kink = (np.abs(finer_bend) > 0.75 * np.abs(bend)) & (

@@ -388,6 +388,21 @@ def test_strong_curves_within_u_are_no_kinks():
         assert found[0, 0] == pytest.approx(np.cos(0.3), rel=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("model", "at"),
+    [
+        (lambda x: x[0] ** 3, 0.0),
+        (lambda x: (x[0] - 1) ** 3, 1.0),
+        (lambda x: x[0] - np.sin(x[0]), 0.0),
+        (lambda x: np.pi * x[0] ** 2 * (15 - x[0]) / 3, 0.0),  # a cap of a sphere, empty
+    ],
+)
+@pytest.mark.parametrize("u", [0.002, 0.1])
+def test_a_slope_may_be_zero(model, at, u):
+    """Closed form: nothing of first order."""
+    assert np.abs(sensitivities_of(model, [at], [u])).max() < 1e-9
+
+
 def test_a_small_contribution_is_not_lost_by_a_cast():
     """Closed form: the second input brings 1e-5 of u, and the complex step would say 0."""
     found = sensitivities_of(lambda x: x[0] + 1e-5 * np.real(x[1]), [1.0, 2.0], [1.0, 1.0])

@@ -387,6 +387,11 @@ def test_same_seed_same_numbers_and_progress_is_reported():
     assert told[-1][1] <= told[-1][2]
 
 
+def test_a_model_that_gives_no_rows_is_refused():
+    with pytest.raises(ValueError, match=r"the model gives \(1,\) for one draw: expected"):
+        simulate(lambda x: x[:, 0], [Normal(1.0)])
+
+
 def test_inputs_that_cannot_be():
     with pytest.raises(ValueError, match="eigenvalue"):
         inputs_of([Normal(1.0)] * 3, [[1, 0.9, -0.9], [0.9, 1, 0.9], [-0.9, 0.9, 1]])
@@ -409,6 +414,42 @@ def test_correlated_non_normal_inputs_have_no_control_variate():
     assert not found.controlled[0]
     assert found.high[0] == pytest.approx(1.9, abs=5 * found.se_high[0] + 1e-6)
     assert found.u[0] == pytest.approx(2 / np.sqrt(3), abs=5 * found.se_u[0] + 1e-6)
+
+
+@pytest.mark.parametrize("r", [1.0, -1.0])
+def test_normals_that_are_one_leave_other_inputs_alone(r):
+    """Closed form: the rectangle behind them was drawn as a unit normal, 17 times too wide."""
+    inputs, correlation = [Normal(1.0), Normal(1.0), rectangular(0.1)], np.eye(3)
+    correlation[0, 1] = correlation[1, 0] = r
+    jacobian = np.array([[0.0, 0.0, 1.0], [1.0, -r, 1.0]])
+    none = np.zeros((1, 3, 3)), np.zeros((2, 1))
+    for model in (
+        lambda x: x @ jacobian.T,
+        QuadraticRows(np.zeros(2), jacobian, *none, np.zeros(3)),
+    ):
+        found = simulate(model, inputs, correlation, goal=SOME)
+        assert found.u == pytest.approx(0.1, abs=1e-9)
+        assert found.high == pytest.approx(0.95 * np.sqrt(3) * 0.1, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("dof", "size", "bend", "probability"), [(5, 0.3, 0.02, 0.999), (2, 0.3, 0.003, 0.99)]
+)
+def test_rare_tails_of_a_curve_are_drawn_for(dof, size, bend, probability):
+    """Simulation: R + b t + q t^2 by 4e6 draws; its ends came out with a standard error of 0, up to
+    a half off, for no point had reached the tail of t.
+    """
+    inputs = [Rectangular(1.0), StudentT(size, dof=dof)]
+    hessian = np.zeros((1, 2, 2))
+    hessian[0, 1, 1] = 1 / size**2
+    model = QuadraticRows(np.zeros(1), np.ones((1, 2)), hessian, np.full((1, 1), bend), np.zeros(2))
+    found = simulate(model, inputs, goal=Goal(probability=probability))
+    generator = np.random.default_rng(7)
+    t = generator.standard_t(dof, 4_000_000)
+    y = generator.uniform(-1, 1, len(t)) + size * t + bend * t**2
+    low, high = np.quantile(y, [(1 - probability) / 2, (1 + probability) / 2])
+    assert found.low[0] == pytest.approx(low, abs=0.01 * (high - low))
+    assert found.high[0] == pytest.approx(high, abs=0.01 * (high - low))
 
 
 def products(strengths):

@@ -135,11 +135,14 @@ def _factor(correlation, count):
     symmetric = correlation.shape == (count, count) and np.allclose(correlation, correlation.T)
     if not symmetric or not np.allclose(np.diag(correlation), 1.0):
         raise ValueError(f"correlation: expected a symmetric {count} x {count} with unit diagonal")
-    values, vectors = np.linalg.eigh(correlation)
-    if values[0] < -1e-10:
+    tied = np.ix_(*2 * [np.any(correlation != np.eye(count), axis=0)])
+    values, vectors = np.linalg.eigh(correlation[tied])
+    if values.min(initial=0.0) < -1e-10:
         raise ValueError(f"not a correlation matrix: eigenvalue {values[0]:.3g}")
     triangle = np.linalg.qr((vectors * np.sqrt(np.clip(values, 0, None))).T, mode="r").T
-    return triangle * np.where(np.diag(triangle) < 0, -1.0, 1.0)
+    found = np.eye(count)  # a singular part must not reach for the coordinates of others
+    found[tied] = triangle * np.where(np.diag(triangle) < 0, -1.0, 1.0)
+    return found
 
 
 def _scale_of(distribution):

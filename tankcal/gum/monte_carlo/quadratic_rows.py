@@ -17,6 +17,7 @@ from tankcal.gum.monte_carlo.sobol import sobol_points
 SETS = 10  # independent point sets
 POINTS = 2048  # of a set; intervals take FIRST to MOST of them
 FIRST, MOST = 8, 1024  # eight of each set are mostly worth 1e7 plain draws
+SEEN = 2.0  # points of all sets beyond an end that are looked at, at least
 PILOT = 16, 64  # points of the first set that place the ends: at first, and where they are too few
 STILL = 0.01  # of the lowest level: targets on a smooth law that moved by less are placed
 NEAR = 0.005  # scores that are taken by Taylor's series, to 1e-8
@@ -44,7 +45,10 @@ def table_estimates(model, ready, goal, progress):
     estimates, errors = np.full((2, 6, len(rows.value)), np.nan)  # what nobody fills shows
     estimates[:2], errors[:2] = _mean_and_error(moments)
     draws = np.full(len(rows.value), SETS * POINTS)
-    pending, count = np.flatnonzero(law.known), FIRST
+    pending, count, first = np.flatnonzero(law.known), FIRST, FIRST
+    while SETS * first * goal.tail < SEEN:
+        first *= 4
+    count = first
     sound = ~np.any(scaled != 0, axis=1) & ~np.any(rows.weights != 0, axis=1)
     estimates[2:, sound], errors[2:, sound] = rows.value[sound], 0.0
     plain = _plain(goal, rows, ready, shapes, law)
@@ -56,7 +60,7 @@ def table_estimates(model, ready, goal, progress):
         sound[pending] = steady & as_good_as_plain(goal, *part)
         part[1][:2] = 0.0  # mean and u come from all points already
         # the first points may be too few to place the ends of a row that is steady
-        again = np.where(steady, ~may_stop(goal, *part), count == FIRST)
+        again = np.where(steady, ~may_stop(goal, *part), count == first)
         pending, count = pending[again], 4 * count
         progress("Monte Carlo", len(law.known) - len(pending), len(law.known))
     return estimates, errors, draws, law.known.copy(), sound

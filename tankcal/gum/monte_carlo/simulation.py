@@ -105,7 +105,10 @@ def _symmetric(ready):
 
 def simulate_in_batches(model, ready, control, goal, progress):
     """Estimates, errors (6, rows), draws and use of the control (rows,), by batches of draws."""
-    rows = np.asarray(model(ready.mean[None, :])).shape[1]
+    shape = np.shape(model(ready.mean[None, :]))
+    if len(shape) != 2 or shape[0] != 1:
+        raise ValueError(f"the model gives {shape} for one draw: expected (1, rows)")
+    rows = shape[1]
     size = batch_size(rows, len(ready.mean), goal)
     total = max(FEWEST, -(-goal.plain_draws // size))
     batches = Batches(rows)
