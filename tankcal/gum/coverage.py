@@ -204,7 +204,7 @@ def student_quantile(tail, dof):
     """
     tail = np.asarray(tail, dtype=float)
     if tail.size < _MANY or dof < _SMOOTH_DOF:
-        return 0.0 - np.abs(stdtrit(dof, tail))  # of probability 0 scipy says inf for some dof
+        return _one_by_one(tail, dof)
     z = ndtri(tail)
     x = z * z
     x *= 2 / _SQUARE
@@ -214,8 +214,12 @@ def student_quantile(tail, dof):
     t = _horner(_powers_of_squares(dof), x)
     np.exp(t, out=t)
     t *= z
-    t[beyond] = -np.abs(stdtrit(dof, tail[beyond]))
+    t[beyond] = _one_by_one(tail[beyond], dof)
     return t
+
+
+def _one_by_one(tail, dof):
+    return 0.0 - np.abs(stdtrit(dof, tail))  # of probability 0 scipy says inf for some dof
 
 
 @cache

@@ -23,11 +23,15 @@ _SHARES = (1.0, 1 / 8, 1 / 64)
 
 @dataclass(frozen=True)
 class _Differences:
-    """(rows, n) extrapolated differences, by how much they may be wrong, and which are sound."""
+    """(rows, n) extrapolated differences, by how much they may be wrong, and which are sound.
+
+    reach  how far the first steps say that an output moves within u, whatever its slope is
+    """
 
     slopes: np.ndarray
     doubt: np.ndarray
     sound: np.ndarray
+    reach: np.ndarray
 
 
 def sensitivities_of(model, x, u, names=None):
@@ -95,13 +99,10 @@ def outputs_of(model, x):
 def _differences(model, x, u):
     """The first sound differences of each sensitivity, over ever smaller steps."""
     middle = outputs_of(model, x)
-    chosen = reach = None
+    chosen = None
     for share in _SHARES:
-        steps = _steps(x, u) * share
-        coarse, bend = _central(model, x, middle, steps)
-        if reach is None:  # where the slope is zero a model may still change within u
-            reach = (np.abs(coarse) + np.abs(bend) / 2) * u
-        now = _differences_over(model, x, u, middle, steps, coarse, bend, reach)
+        reach = None if chosen is None else chosen.reach
+        now = _differences_over(model, x, u, middle, _steps(x, u) * share, reach)
         if chosen is None:
             chosen = now
         better = now.sound & ~chosen.sound
@@ -109,13 +110,17 @@ def _differences(model, x, u):
             np.where(better, now.slopes, chosen.slopes),
             np.where(better, now.doubt, chosen.doubt),
             chosen.sound | now.sound,
+            reach=chosen.reach,
         )
         if np.all(chosen.sound):
             break
     return chosen
 
 
-def _differences_over(model, x, u, middle, steps, coarse, bend, reach):
+def _differences_over(model, x, u, middle, steps, reach=None):
+    coarse, bend = _central(model, x, middle, steps)
+    if reach is None:
+        reach = (np.abs(coarse) + np.abs(bend) / 2) * u
     fine, finer_bend = _central(model, x, middle, steps / 2)
     slopes = fine + (fine - coarse) / 3
     rounding = _ROUNDING * np.abs(middle)[:, None] / steps
@@ -126,7 +131,7 @@ def _differences_over(model, x, u, middle, steps, coarse, bend, reach):
         (np.abs(finer_bend) - rounding) * u > allowed
     )
     sound = ((curved - rounding) * u <= allowed) & ~kink
-    return _Differences(slopes, curved + rounding, sound)
+    return _Differences(slopes, curved + rounding, sound, reach)
 
 
 def _central(model, x, middle, steps):

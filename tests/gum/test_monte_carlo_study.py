@@ -205,7 +205,7 @@ def test_uncorrelated_control_variate_is_harmless(figure):
 def test_a_table_is_no_worse_than_a_million_plain_draws_study(kinds, count, figure):
     """9 500 rows: the goal; its time is measured by benchmarks/monte_carlo.py.
 
-    A scatter over 8 seeds is known to 27 %, over 50 to 10 %; the worst ratio of 50 seeds was 0.20.
+    A scatter over 8 seeds is known to 27 %, over 50 to 10 %; the worst ratio of 50 seeds was 0.11.
     """
     assert np.all(ratios_over_seeds(9500, draws(8, 50), kinds, count, figure) <= 1)
     figure("peak memory of the whole test run, MB", peak_mb())

@@ -45,10 +45,10 @@ def table_estimates(model, ready, goal, progress):
     estimates, errors = np.full((2, 6, len(rows.value)), np.nan)  # what nobody fills shows
     estimates[:2], errors[:2] = _mean_and_error(moments)
     draws = np.full(len(rows.value), SETS * POINTS)
-    pending, count, first = np.flatnonzero(law.known), FIRST, FIRST
+    first = FIRST
     while SETS * first * goal.tail < SEEN:
         first *= 4
-    count = first
+    pending, count = np.flatnonzero(law.known), first
     sound = ~np.any(scaled != 0, axis=1) & ~np.any(rows.weights != 0, axis=1)
     estimates[2:, sound], errors[2:, sound] = rows.value[sound], 0.0
     plain = _plain(goal, rows, ready, shapes, law)
