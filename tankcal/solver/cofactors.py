@@ -17,7 +17,7 @@ from tankcal.solver.elimination import (
     roots,
     through_reduced,
 )
-from tankcal.solver.sandwich import sandwich
+from tankcal.solver.propagate import propagate_cofactors
 from tankcal.solver.threads import threads_for
 
 DENSE = 4e6  # numbers
@@ -135,7 +135,7 @@ class Cofactors:
         normals = self.factor.normals
         through = through_reduced(self.plan, normals, columns)
         if len(columns) >= self.plan.reduced and is_worth_compiling(self.plan.rows):
-            q = sandwich(np.ascontiguousarray(through.T), self.reduced_cofactors)
+            q = propagate_cofactors(np.ascontiguousarray(through.T), self.reduced_cofactors)
         else:
             whitened = self.factor.whitened(through)
             q = whitened.T @ whitened
@@ -224,9 +224,8 @@ class Cofactors:
 
         It is nothing but for rows that feel a motion of the whole that no other row holds.
         """
-        if self.datum is None:
+        if not len(columns) or self.datum is None:
             return np.zeros(jac.shape[:2])
-        null_space, h, m = self.datum
-        free, across = (np.vstack([part, np.zeros((1, part.shape[1]))]) for part in (null_space, h))
-        by_free, by_h = (np.einsum("nmk,nkd->nmd", jac, part[columns]) for part in (free, across))
-        return np.einsum("nmd,nmd->nm", by_free @ m - 2 * by_h, by_free)
+        change = self._in_datum(0.0, columns, columns)
+        jac = np.where(columns[:, None] < 0, 0.0, jac)
+        return np.einsum("nmk,nkl,nml->nm", jac, change, jac)

@@ -45,7 +45,7 @@ def _asked_for():
 
 _SOURCES = (
     Path(__file__).with_name("loops.py"),
-    Path(__file__).with_name("sandwich.py"),
+    Path(__file__).with_name("propagate.py"),
     Path(__file__).with_name("series.py"),
     Path(__file__).parents[1] / "camera/imaging.py",
 )

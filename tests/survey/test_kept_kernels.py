@@ -24,7 +24,7 @@ class Refusing:
         raise OSError(30, "Read-only file system")
 
 numba.core.caching.tempfile = Refusing
-import tankcal.camera.imaging, tankcal.solver.loops, tankcal.solver.sandwich, tankcal.solver.series
+import tankcal.camera.imaging, tankcal.solver.loops, tankcal.solver.propagate, tankcal.solver.series
 from networks import by_total_station, photographed
 from tankcal.solver.compiled import compile_functions
 from tankcal.survey.network import adjust
@@ -35,7 +35,7 @@ for make in (photographed, by_total_station):
     assert adjusted.covariance_m2().any()
 rooms = {
     tankcal.solver.loops: "COMPILED",
-    tankcal.solver.sandwich: "COMPILED",
+    tankcal.solver.propagate: "COMPILED",
     tankcal.solver.series: "COMPILED",
     tankcal.camera.imaging: "_COMPILED",
 }

@@ -9,7 +9,7 @@ import pytest
 from tankcal.camera import imaging
 from tankcal.camera.model import Form
 from tankcal.geometry.rotations import rotation_of_view
-from tankcal.solver import Group, elimination, loops, model, sandwich, series
+from tankcal.solver import Group, elimination, loops, model, propagate, series
 from tankcal.solver.model import Normals
 
 PHOTOS, POINTS, RAYS = 3, 40, 210  # more of a photo than are computed side by side
@@ -207,17 +207,17 @@ def test_elimination_by_loops_is_that_of_arrays(panel, wide, side, monkeypatch):
         assert one == pytest.approx(other, abs=1e-11)
 
 
-@pytest.mark.parametrize("tile", [8, sandwich.TILE])
+@pytest.mark.parametrize("tile", [8, propagate.TILE])
 @pytest.mark.parametrize(("k", "n"), [(1, 1), (2, 5), (3, 4), (19, 11), (40, 9)])
 def test_a_product_with_few_numbers_is_that_of_whole_matrices(k, n, tile, monkeypatch):
     """Second method; rows in threes and numbers in fours, and what is left of them."""
     rng = np.random.default_rng(29)
     a = np.where(rng.random((k, n)) < 0.3, rng.normal(size=(k, n)), 0.0)
     root = rng.normal(size=(n, n))
-    monkeypatch.setattr(sandwich, "TILE", tile)
-    plain = SimpleNamespace(**{name: vars(sandwich)[name] for name in sandwich.COMPILED})
-    monkeypatch.setattr(sandwich, "compile_functions", lambda module, names: plain)
-    found = sandwich.sandwich(a, root @ root.T)
+    monkeypatch.setattr(propagate, "TILE", tile)
+    plain = SimpleNamespace(**{name: vars(propagate)[name] for name in propagate.COMPILED})
+    monkeypatch.setattr(propagate, "compile_functions", lambda module, names: plain)
+    found = propagate.propagate_cofactors(a, root @ root.T)
     assert found == pytest.approx(a @ root @ root.T @ a.T, abs=1e-12)
     assert (found == found.T).all()
 

@@ -116,7 +116,7 @@ def test_loops_and_arrays_agree(make, compiler, monkeypatch):
         solver = tankcal.solver
         for room in (solver.elimination, solver.cofactors, tankcal.camera.imaging):
             monkeypatch.setattr(room, "is_worth_compiling", lambda rows=0, choice=choice: choice)
-        for room in (solver.elimination, solver.sandwich, tankcal.camera.imaging):
+        for room in (solver.elimination, solver.propagate, tankcal.camera.imaging):
             monkeypatch.setattr(room, "compile_functions", compiler)
         found.append(adjust(survey, datum="inner"))
         assert found[-1].residuals  # leverages too

@@ -11,17 +11,17 @@ import numpy as np
 from tankcal.solver.compiled import compile_functions
 
 TILE = 512  # columns that are multiplied at a time: what is read again stays in the cache
-COMPILED = ("_gather", "_add_products", "_times", "_mirror", "_sandwich")
+COMPILED = ("_gather", "_add_products", "_times", "_mirror", "_propagate")
 
 
-def sandwich(a, m):
+def propagate_cofactors(a, m):
     """A M A' (k, k); a (k, n) and m (n, n) row by row, m symmetric."""
     out = np.empty((len(a), len(a)))
-    compile_functions(sys.modules[__name__], COMPILED)._sandwich(a, m, out)
+    compile_functions(sys.modules[__name__], COMPILED)._propagate(a, m, out)
     return out
 
 
-def _sandwich(a, m, out):
+def _propagate(a, m, out):
     half = np.empty(a.shape)
     _times(a, m, False, half)
     _times(a, np.ascontiguousarray(half.T), True, out)
