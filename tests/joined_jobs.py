@@ -24,7 +24,7 @@ from generated_hits import (
 )
 from generated_lines import plumbed_job
 from generated_strapping import PLATE_M, girth_of
-from generated_walls import FULL_TURN, Survey, job_of
+from generated_walls import FULL_TURN, LEAN, Survey, job_of
 
 from tankcal.pipeline.hit_wall import sight_wall
 from tankcal.survey.measurements import Setup
@@ -76,7 +76,6 @@ def untied_job(rng, wall, *, folder, hits=8, setups=3, sd_m=1.5e-3):
     """Bare hits from set-ups in the tank that share nothing; where each stood is known to 0.1 m."""
     job = hit_job(rng, wall, folder=folder / "hits", hits=hits, sd_m=sd_m)
     given = job.hits
-    levels = len(given) // hits
     size = wall.radius_m
     surface = Surface(partial(_radius, wall), (0.0, 0.0), tuple(2e-3 * rng.normal(size=2)))
     z = [(c + part) * wall.course_m for c in range(wall.courses) for part in (0.25, 0.75)]
@@ -90,12 +89,43 @@ def untied_job(rng, wall, *, folder, hits=8, setups=3, sd_m=1.5e-3):
         name = f"I{i + 1}"
         places[f"S{i + 1}"] = np.array([*(station[:2] + 0.1 * rng.uniform(-1, 1, 2)), 0.0])
         known[name] = Setup(name, f"S{i + 1}", "TS", 1.6)
-    count = setups * hits * levels
+    return replace(job, hits=_of_untied(given, known, places, read, sd_m))
+
+
+def outside_job(rng, wall, *, folder, hits, setups, sd_m=1.5e-3):
+    """Bare hits from untied set-ups round the tank; each place is known to 0.1 m.
+
+    Every set-up reads so many hits at each level, at incidences up to 60 degrees.
+    """
+    job = hit_job(rng, wall, folder=folder / "hits", hits=hits, sd_m=sd_m)
+    size = wall.radius_m + PLATE_M
+    surface = Surface(lambda azimuth, z: _radius(wall, azimuth, z) + PLATE_M, (0.0, 0.0), LEAN)
+    z = [(c + part) * wall.course_m for c in range(wall.courses) for part in (0.25, 0.75)]
+    tool = Tool(U_OFFSET * rng.normal(), 1e-5 * rng.normal(), 1e-3 * rng.normal(), sd_m, 3e-5)
+    read, places, known, start = [], {}, {}, rng.uniform(0, FULL_TURN)
+    for i in range(setups):
+        turn = start + FULL_TURN * (i + rng.uniform(-0.1, 0.1)) / setups
+        far = size + rng.uniform(5, 12)
+        station = np.array([far * np.sin(turn), far * np.cos(turn), 1.6])
+        seen = np.pi / 3 - np.arcsin(size / far * np.sin(np.pi / 3))  # sine rule, at 60 degrees
+        azimuth = turn + np.linspace(-seen, seen, hits)
+        aims = np.vstack([surface.at(azimuth, np.full(hits, level)) for level in z])
+        read.append(take_hits(surface, station, aims, tool, rng, zero=rng.uniform(0, 6)))
+        name = f"I{i + 1}"
+        places[f"S{i + 1}"] = np.array([*(station[:2] + 0.1 * rng.uniform(-1, 1, 2)), 0.0])
+        known[name] = Setup(name, f"S{i + 1}", "TS", 1.6)
+    found = _of_untied(job.hits, known, places, read, sd_m)
+    return replace(job, hits=found, survey=replace(job.survey, side="outside"))
+
+
+def _of_untied(given, setups, stations, read, sd_m):
+    """`WallHits` of set-ups, each of as many readings, with the tools of given ones."""
+    each, count = len(read[0]), len(setups) * len(read[0])
     nothing = (None,) * count
     direction, zenith, distance = np.vstack(read).T
-    found = replace(
+    return replace(
         given,
-        setup=tuple(name for name in known for _ in range(hits * levels)),
+        setup=tuple(name for name in setups for _ in range(each)),
         set=nothing,
         course=nothing,
         direction_rad=direction,
@@ -105,11 +135,10 @@ def untied_job(rng, wall, *, folder, hits=8, setups=3, sd_m=1.5e-3):
         sd_rad=np.full(count, 3e-5),
         surface=("",) * count,
         check=np.zeros(count, dtype=bool),
-        setups=known,
+        setups=setups,
         rows=tuple(range(2, count + 2)),
-        stations=places,
+        stations=stations,
     )
-    return replace(job, hits=found)
 
 
 def sighted(job):

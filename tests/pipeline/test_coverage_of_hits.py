@@ -25,17 +25,22 @@ def found_of(rng, family, rings, folder, straps=False):
     """As `test_coverage_of_walls.found_of`; rings stands for the number of hits of a level."""
     radius = np.exp(rng.uniform(*np.log([4, 25])))
     wall = make_wall(rng, family, radius_m=radius, courses=rng.integers(4, 8))
-    job = hit_job(
-        rng,
-        wall,
-        folder=folder,
-        hits=HITS[rings],
-        straps=straps,
-        sd_m=np.exp(rng.uniform(*np.log([5e-4, 3e-3]))),
-    )
+    job = draw_job(rng, wall, HITS[rings], folder, straps)
     job, _ = sight_wall(job, None, lambda text: None)
     assert not is_smoothed(job)  # its one set-up is the frame
     return judged(wall, body_of(job, find_wall(job, lambda text: None)), family, rings)
+
+
+def draw_job(rng, wall, hits, folder, straps=False):
+    """A job of bare hits of a wall from one set-up inside, with random settings."""
+    return hit_job(
+        rng,
+        wall,
+        folder=folder,
+        hits=hits,
+        straps=straps,
+        sd_m=np.exp(rng.uniform(*np.log([5e-4, 3e-3]))),
+    )
 
 
 @pytest.mark.slow

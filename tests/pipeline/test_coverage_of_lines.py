@@ -25,17 +25,22 @@ def found_of(rng, family, rings, folder, faces=2):
     """As `test_coverage_of_walls.found_of`; rings stands for the number of lines."""
     radius = np.exp(rng.uniform(*np.log([4, 40])))
     wall = make_wall(rng, family, radius_m=radius, courses=rng.integers(5, 11))
+    job = draw_job(rng, wall, LINES[rings], folder, faces)
+    return judged(wall, body_of(job, find_strapped_wall(job, lambda text: None)), family, rings)
+
+
+def draw_job(rng, wall, lines, folder, faces=2):
+    """A job of reference lines round a wall, with random settings."""
     job = plumbed_job(
         rng,
         wall,
-        lines=LINES[rings],
+        lines=lines,
         folder=folder,
         faces=faces,
         sd_m=np.exp(rng.uniform(*np.log([3e-4, 1e-3]))),
     )[0]
     shape = shape_of(wall) * np.exp(0.3 * rng.normal())
-    job = replace(job, strapping=replace(job.strapping, shape_sd_m=shape))
-    return judged(wall, body_of(job, find_strapped_wall(job, lambda text: None)), family, rings)
+    return replace(job, strapping=replace(job.strapping, shape_sd_m=shape))
 
 
 @pytest.mark.slow

@@ -24,7 +24,14 @@ def found_of(rng, family, straps, folder, declared=1.0):
     """As `test_coverage_of_walls.found_of`; declared: part of the shape that is said to be there"""
     radius = np.exp(rng.uniform(*np.log([3, 40])))
     wall = make_wall(rng, family, radius_m=radius, courses=rng.integers(5, 11))
-    job = strapped_job(
+    job = draw_job(rng, wall, straps, folder, declared)
+    wall_found = find_strapped_wall(job, lambda text: None)
+    return judged(wall, body_of(job, wall_found), family, straps)
+
+
+def draw_job(rng, wall, straps, folder, declared=1.0):
+    """A job of a strapping of a wall, with random settings."""
+    return strapped_job(
         rng,
         wall,
         straps=straps,
@@ -32,8 +39,6 @@ def found_of(rng, family, straps, folder, declared=1.0):
         laying_m=np.exp(rng.uniform(*np.log([3e-4, 2e-3]))),
         shape_sd_m=declared * shape_of(wall) * np.exp(0.3 * rng.normal()),
     )
-    wall_found = find_strapped_wall(job, lambda text: None)
-    return judged(wall, body_of(job, wall_found), family, straps)
 
 
 @pytest.mark.slow

@@ -23,15 +23,20 @@ def found_of(rng, family, rings, folder):
     """As `test_coverage_of_walls.found_of`; rings stands for the number of stations."""
     radius = np.exp(rng.uniform(*np.log([4, 25])))
     wall = make_wall(rng, family, radius_m=radius, courses=rng.integers(4, 8))
-    job, poses, tools = tangent_job(
+    job, poses, tools = draw_job(rng, wall, STATIONS[rings], folder)
+    job, _, found = touch_wall(job, poses, tools, lambda text: None)
+    return judged(wall, body_of(job, found), family, rings)
+
+
+def draw_job(rng, wall, stations, folder):
+    """A job of the tangents of a wall with its poses and tools, with random settings."""
+    return tangent_job(
         rng,
         wall,
         folder=folder,
-        stations=STATIONS[rings],
+        stations=stations,
         sd_rad=np.exp(rng.uniform(*np.log([1e-5, 6e-5]))),
     )
-    job, _, found = touch_wall(job, poses, tools, lambda text: None)
-    return judged(wall, body_of(job, found), family, rings)
 
 
 @pytest.mark.slow

@@ -37,6 +37,12 @@ def found_of(rng, family, rings, folder):
     wall = make_wall(
         rng, family, radius_m=np.exp(rng.uniform(*np.log([3, 40]))), courses=rng.integers(5, 11)
     )
+    job = draw_job(rng, wall, rings, folder)
+    return judged(wall, body_of(job, find_wall(job, lambda text: None)), family, rings)
+
+
+def draw_job(rng, wall, rings, folder):
+    """A job of a survey of a wall by points, with random settings."""
     measured = survey(
         rng,
         wall,
@@ -45,8 +51,7 @@ def found_of(rng, family, rings, folder):
         noise_m=np.exp(rng.uniform(*np.log([5e-4, 5e-3]))),
         layout=str(rng.choice(["even", "even", "free", "gap"])),
     )
-    job = job_of(wall, measured, folder, given=bool(rng.random() < 0.6))
-    return judged(wall, body_of(job, find_wall(job, lambda text: None)), family, rings)
+    return job_of(wall, measured, folder, given=bool(rng.random() < 0.6))
 
 
 def judged(wall, body, family, rings):
