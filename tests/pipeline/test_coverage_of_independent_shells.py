@@ -127,7 +127,7 @@ def survey_shell(method, family, seed, folder):
     if result.worst <= FAR:
         return result
     warnings = check_table(job, wall, compute_table(job, wall), sighting)
-    return Judged(family, shell.radius_m, found, tuple(one.text.code for one in warnings))
+    return Judged(family, shell.radius_m, found, tuple(one.expected.code for one in warnings))
 
 
 def study(method, shells, folder, figure):
