@@ -250,11 +250,13 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
     The form is the same at all heights but for a part that grows linearly with height; its modes,
     the slope and what is `Uneven` are unknowns with a prior (an observation of zero). Without
     `form` the shell is round. sd (n,) of the radii.
+
+    Azimuths of the form are those about `axis`, so that the form is linear: about an axis that
+    moves in the adjustment, high modes of a deep form make Gauss-Newton swing without end.
     """
     courses, row_of = np.unique(course, return_inverse=True)
     n, modes = len(xyz), 0 if form is None else 2 * (MODES - 1)
     first_mode = 4 + len(courses)
-    height = _relative_height(xyz)
     by_radius = np.zeros((n, len(courses)))
     by_radius[np.arange(n), row_of] = -1.0
     by_uneven = np.zeros((n, 0)) if uneven is None else uneven.columns
@@ -264,14 +266,13 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
     priors[2 * modes : 2 * modes + 2, 2:4] = np.eye(2)
     priors[2 * modes + 2 :, last_mode:] = np.eye(more)
 
+    by_form = np.zeros((n, 0))
+    if modes:
+        by_form = _form_columns(distances_from_axis(xyz, axis)[0], _relative_height(xyz))
+
     def model(x, observations):
         offset, distance = distances_from_axis(xyz, x[:4])
-        sin, cos = offset[:, 0] / distance, offset[:, 1] / distance
-        turn, by_form = np.zeros(n), np.zeros((n, 2 * modes))
-        if modes:
-            by_form = _form_columns(offset, height)
-            turn = by_form @ _turned(x[first_mode:last_mode]) / distance
-        by_xy = -np.column_stack([sin - turn * cos, cos + turn * sin])
+        by_xy = -offset / distance[:, None]
         by_axis = np.hstack([by_xy, by_xy * xyz[:, 2:]])
         top = np.hstack([by_axis, by_radius, -by_form, -by_uneven])
         misclosure = _misclosure(distance, row_of, by_form, by_uneven, x)
@@ -295,15 +296,6 @@ def _form_columns(offset, height):
     """(n, columns) derivative of the radii by the form, and by its part that grows with height."""
     waves = harmonics(np.arctan2(offset[:, 0], offset[:, 1]), MODES)[:, 3:]
     return np.hstack([waves, waves * height[:, None]])
-
-
-def _turned(form):
-    """Coefficients of the derivative by the azimuth of a form, whose columns are `_form_columns`.
-
-    c cos k a + s sin k a becomes k s cos k a - k c sin k a.
-    """
-    order = np.tile(np.arange(2, MODES + 1), 2)
-    return np.column_stack([order * form[1::2], -order * form[::2]]).ravel()
 
 
 def _misclosure(distance, row_of, by_form, by_uneven, x):
