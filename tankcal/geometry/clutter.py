@@ -266,13 +266,15 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
 
     def model(x, observations):
         offset, distance = distances_from_axis(xyz, x[:4])
-        sin, cos = offset[:, 0] / distance, offset[:, 1] / distance
+        along = _height_along(offset, x[2:4])
+        # d(rho)/d(offset); d(rho)/d(slope) is that times the height along the axis, z + along
+        sin, cos = (offset - np.outer(along, x[2:4])).T / distance
         turn, by_form = np.zeros(n), np.zeros((n, 2 * modes))
         if modes:
             by_form = _form_columns(offset, height)
             turn = by_form @ _turned(x[first_mode:last_mode]) / distance
         by_xy = -np.column_stack([sin - turn * cos, cos + turn * sin])
-        by_axis = np.hstack([by_xy, by_xy * xyz[:, 2:]])
+        by_axis = np.hstack([by_xy, by_xy * (xyz[:, 2:] + along[:, None])])
         top = np.hstack([by_axis, by_radius, -by_form, -by_uneven])
         misclosure = _misclosure(distance, row_of, by_form, by_uneven, x)
         modelled = np.concatenate([misclosure, x[first_mode:last_mode], x[2:4], x[last_mode:]])
@@ -314,6 +316,38 @@ def _misclosure(distance, row_of, by_form, by_uneven, x):
 
 
 def distances_from_axis(local, axis):
-    """Horizontal offsets (n, 2) and distances (n,) from the axis at each point's own height."""
-    offset = local[:, :2] - axis[:2] - local[:, 2:] * axis[2:4]
-    return offset, np.hypot(offset[:, 0], offset[:, 1])
+    """Horizontal offsets and distances of points from a leaning axis.
+
+    The offset is horizontal, at the point's own height. The distance is square to the axis: that of
+    a cylinder is the same all round, whereas its horizontal cut is an ellipse.
+
+        rho^2 = |o|^2 - (o . s)^2 / (1 + s . s),    o the offset, s the slope of the axis
+
+    Parameters
+    ----------
+    local : ndarray, shape (n, 3)
+        Points, m.
+    axis : array_like, shape (4,)
+        x and y of the axis at z = 0, m, and its slopes dx/dz and dy/dz.
+
+    Returns
+    -------
+    offset : ndarray, shape (n, 2)
+    distance : ndarray, shape (n,)
+        m.
+
+    Examples
+    --------
+    >>> offset, distance = distances_from_axis(np.array([[1.25, 0.0, 0.0]]), [0, 0, 0.75, 0])
+    >>> offset.tolist(), distance.tolist()
+    ([[1.25, 0.0]], [1.0])
+    """
+    slope = np.asarray(axis[2:4], dtype=float)
+    offset = local[:, :2] - axis[:2] - local[:, 2:] * slope
+    along = _height_along(offset, slope)
+    return offset, np.sqrt(np.sum(offset**2, axis=1) - along * (offset @ slope))
+
+
+def _height_along(offset, slope):
+    """(n,) height by which the foot of a point on the axis lies above the point's own height."""
+    return offset @ slope / (1 + slope @ slope)
