@@ -247,7 +247,7 @@ def _checks(found):
         s_dip_m=np.where(compared, OF_NO_WEIGHT_M, metering.s_dip_m),
     )
     geometry = replace(geometry, job=replace(geometry.job, liquid=loose))
-    again = adjusted_at(geometry, fill_of(loose), lambda *_: found.run_effect)
+    again = adjusted_at(geometry, fill_of(loose), lambda *_: found.run_effect, found.corrections_m)
     effect = next(one for one in again.adjusted.noise if one.kind == "dip_readings")
     deviates, redundancy, _ = again.adjusted.residuals(effect)
     mine = compared[again.fill.dip_row]
