@@ -250,7 +250,11 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
     The form is the same at all heights but for a part that grows linearly with height; its modes,
     the slope and what is `Uneven` are unknowns with a prior (an observation of zero). Without
     `form` the shell is round. sd (n,) of the radii.
+
+    Distances are square to the axis as it leans at first: its ellipse is known, but is no
+    observation of the slope, else the ovality of a single ring would be taken for a lean.
     """
+    lean = np.array(axis[2:4], dtype=float)
     courses, row_of = np.unique(course, return_inverse=True)
     n, modes = len(xyz), 0 if form is None else 2 * (MODES - 1)
     first_mode = 4 + len(courses)
@@ -265,16 +269,15 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
     priors[2 * modes + 2 :, last_mode:] = np.eye(more)
 
     def model(x, observations):
-        offset, distance = distances_from_axis(xyz, x[:4])
-        along = _height_along(offset, x[2:4])
-        # d(rho)/d(offset); d(rho)/d(slope) is that times the height along the axis, z + along
-        sin, cos = (offset - np.outer(along, x[2:4])).T / distance
+        offset = _offsets(xyz, x[:4])
+        distance, along = _square_to(offset, lean)
+        sin, cos = (offset - np.outer(along, lean)).T / distance  # d(distance) / d(offset)
         turn, by_form = np.zeros(n), np.zeros((n, 2 * modes))
         if modes:
             by_form = _form_columns(offset, height)
             turn = by_form @ _turned(x[first_mode:last_mode]) / distance
         by_xy = -np.column_stack([sin - turn * cos, cos + turn * sin])
-        by_axis = np.hstack([by_xy, by_xy * (xyz[:, 2:] + along[:, None])])
+        by_axis = np.hstack([by_xy, by_xy * xyz[:, 2:]])
         top = np.hstack([by_axis, by_radius, -by_form, -by_uneven])
         misclosure = _misclosure(distance, row_of, by_form, by_uneven, x)
         modelled = np.concatenate([misclosure, x[first_mode:last_mode], x[2:4], x[last_mode:]])
@@ -342,12 +345,16 @@ def distances_from_axis(local, axis):
     >>> offset.tolist(), distance.tolist()
     ([[1.25, 0.0]], [1.0])
     """
-    slope = np.asarray(axis[2:4], dtype=float)
-    offset = local[:, :2] - axis[:2] - local[:, 2:] * slope
-    along = _height_along(offset, slope)
-    return offset, np.sqrt(np.sum(offset**2, axis=1) - along * (offset @ slope))
+    offset = _offsets(local, axis)
+    return offset, _square_to(offset, np.asarray(axis[2:4], dtype=float))[0]
 
 
-def _height_along(offset, slope):
-    """(n,) height by which the foot of a point on the axis lies above the point's own height."""
-    return offset @ slope / (1 + slope @ slope)
+def _offsets(local, axis):
+    """(n, 2) horizontal offsets of points from the axis at their own height."""
+    return local[:, :2] - axis[:2] - local[:, 2:] * axis[2:4]
+
+
+def _square_to(offset, slope):
+    """Distances (n,) square to an axis, and heights (n,) of their feet above the points."""
+    along = offset @ slope / (1 + slope @ slope)
+    return np.sqrt(np.sum(offset**2, axis=1) - along * (offset @ slope)), along
