@@ -22,6 +22,8 @@ from tankcal.pipeline.liquid import measure_by_liquid
 from tankcal.pipeline.liquid_adjustment import adjust_liquid
 from tankcal.pipeline.liquid_alone import geometry_alone, geometry_beside
 from tankcal.pipeline.liquid_body import join_body
+from tankcal.pipeline.liquid_checks import check_liquid_result
+from tankcal.pipeline.liquid_naming import is_steady_leak
 from tankcal.pipeline.surveying import find_survey
 from tankcal.record import record_of
 from tankcal.report import certificate
@@ -79,6 +81,18 @@ def test_what_hides_is_what_an_error_of_that_size_does_to_the_table(upright):
 
 def moment(text):
     return datetime.datetime.fromisoformat(str(text))
+
+
+@pytest.mark.parametrize(
+    ("w", "named", "told"),
+    [(3.5, False, True), (-3.5, False, True), (3.2, False, False), (4.5, True, False)],
+)
+def test_a_drift_with_time_has_a_test_of_its_own(upright, w, named, told):
+    """The limit is 3.29, of one test in a thousand; a named cause is told in another warning."""
+    found = run(upright).liquid
+    leak = replace(next(filter(is_steady_leak, found.causes)), w=w, size=0.05, is_named=named)
+    problems = check_liquid_result(upright, replace(found, causes=(leak,)))
+    assert ("liquid_drifts" in [one.expected.code for one in problems]) is told
 
 
 @pytest.mark.parametrize("proved", [False, True])
