@@ -253,7 +253,10 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
 
     Azimuths of the form are those about `axis`, so that the form is linear: about an axis that
     moves in the adjustment, high modes of a deep form make Gauss-Newton swing without end.
+    Distances are square to the axis as it leans at first: its ellipse is known, but is no
+    observation of the slope, else the ovality of a single ring would be taken for a lean.
     """
+    lean = np.array(axis[2:4], dtype=float)
     courses, row_of = np.unique(course, return_inverse=True)
     n, modes = len(xyz), 0 if form is None else 2 * (MODES - 1)
     first_mode = 4 + len(courses)
@@ -271,8 +274,9 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
         by_form = _form_columns(distances_from_axis(xyz, axis)[0], _relative_height(xyz))
 
     def model(x, observations):
-        offset, distance = distances_from_axis(xyz, x[:4])
-        by_xy = -offset / distance[:, None]
+        offset = _offsets(xyz, x[:4])
+        distance, along = _square_to(offset, lean)
+        by_xy = -(offset - np.outer(along, lean)) / distance[:, None]  # d(distance) / d(offset)
         by_axis = np.hstack([by_xy, by_xy * xyz[:, 2:]])
         top = np.hstack([by_axis, by_radius, -by_form, -by_uneven])
         misclosure = _misclosure(distance, row_of, by_form, by_uneven, x)
@@ -306,6 +310,42 @@ def _misclosure(distance, row_of, by_form, by_uneven, x):
 
 
 def distances_from_axis(local, axis):
-    """Horizontal offsets (n, 2) and distances (n,) from the axis at each point's own height."""
-    offset = local[:, :2] - axis[:2] - local[:, 2:] * axis[2:4]
-    return offset, np.hypot(offset[:, 0], offset[:, 1])
+    """Horizontal offsets and distances of points from a leaning axis.
+
+    The offset is horizontal, at the point's own height. The distance is square to the axis: that of
+    a cylinder is the same all round, whereas its horizontal cut is an ellipse.
+
+        rho^2 = |o|^2 - (o . s)^2 / (1 + s . s),    o the offset, s the slope of the axis
+
+    Parameters
+    ----------
+    local : ndarray, shape (n, 3)
+        Points, m.
+    axis : array_like, shape (4,)
+        x and y of the axis at z = 0, m, and its slopes dx/dz and dy/dz.
+
+    Returns
+    -------
+    offset : ndarray, shape (n, 2)
+    distance : ndarray, shape (n,)
+        m.
+
+    Examples
+    --------
+    >>> offset, distance = distances_from_axis(np.array([[1.25, 0.0, 0.0]]), [0, 0, 0.75, 0])
+    >>> offset.tolist(), distance.tolist()
+    ([[1.25, 0.0]], [1.0])
+    """
+    offset = _offsets(local, axis)
+    return offset, _square_to(offset, np.asarray(axis[2:4], dtype=float))[0]
+
+
+def _offsets(local, axis):
+    """(n, 2) horizontal offsets of points from the axis at their own height."""
+    return local[:, :2] - axis[:2] - local[:, 2:] * axis[2:4]
+
+
+def _square_to(offset, slope):
+    """Distances (n,) square to an axis, and heights (n,) of their feet above the points."""
+    along = offset @ slope / (1 + slope @ slope)
+    return np.sqrt(np.sum(offset**2, axis=1) - along * (offset @ slope)), along

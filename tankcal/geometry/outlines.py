@@ -122,6 +122,35 @@ def polar(xy_m, x_m, y_m):
     return np.arctan2(d[:, 0], d[:, 1]) % FULL_TURN, np.hypot(d[:, 0], d[:, 1])
 
 
+def radii_square_to_axis(azimuth_rad, radius_m, slope):
+    """Radii of a horizontal cut without the ellipse that the lean of the axis makes of a circle.
+
+    A cylinder that leans by m has a horizontal cut of semi-axes r and r sqrt(1 + m^2). Its radius
+    over the distance from the axis is (1 - (n . s)^2 / (1 + m^2))^(-1/2) in the direction n. The
+    factor (1 + m^2)^(1/4) keeps the area of the cut, so a cylinder becomes a circle of equal area.
+
+    Parameters
+    ----------
+    azimuth_rad, radius_m : ndarray, shape (n,)
+        About the axis, rad, and m.
+    slope : array_like, shape (2,)
+        Of the axis: metres in x and y for a metre of height.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        m.
+
+    Examples
+    --------
+    >>> radii_square_to_axis(np.array([0.0, np.pi / 2]), np.array([1.0, 1.25]), (0.75, 0.0)) ** 2
+    array([1.25, 1.25])
+    """
+    steep = 1 + slope[0] ** 2 + slope[1] ** 2
+    lean = slope[0] * np.sin(azimuth_rad) + slope[1] * np.cos(azimuth_rad)
+    return radius_m * steep**0.25 * np.sqrt(1 - lean**2 / steep)
+
+
 def evenly_spread(azimuth_rad):
     """Whether an interpolated outline can be trusted through these azimuths.
 

@@ -190,6 +190,16 @@ def test_courses_err_alike_as_far_as_their_columns_do(turned):
     assert np.sqrt(np.diag(found)) == pytest.approx(one_m)
 
 
+def test_seams_between_columns_do_not_depend_on_where_azimuths_count_from():
+    """Property: uneven columns in three courses, turned by any angle, have one covariance."""
+    rng, course = np.random.default_rng(3), np.repeat([0, 1, 2], [24, 31, 400])
+    azimuth = rng.uniform(0, FULL_TURN, len(course))
+    found = hidden_covariance_m2(course, azimuth, 6.5)
+    for turn in (1e-4, 0.37, 2.0, 5.1):
+        turned = hidden_covariance_m2(course, (azimuth + turn) % FULL_TURN, 6.5)
+        assert turned == pytest.approx(found, abs=1e-10 * found.max())
+
+
 def test_a_dense_ring_helps_its_own_course_alone():
     """24 columns in three courses, and 300 points more in one of them."""
     even, dense = FULL_TURN * np.arange(24) / 24, FULL_TURN * np.arange(300) / 300
