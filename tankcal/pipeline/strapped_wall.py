@@ -8,7 +8,7 @@ doubt, and the field of the wall says how much it may. Offsets from reference li
 of the strapped course to all others; then the wall is a surface of revolution.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -185,13 +185,15 @@ def find_strapped_wall(job, progress, amplitudes=None):
     )
 
 
-def adjust_readings(readings, sizes, amplitudes, *, snooping):
+def adjust_readings(readings, sizes, amplitudes, *, snooping, bulge_scale=1.0):
     """Readings with the eccentricity of their rings, what became of each, and `WallField`.
 
-    sizes  joints, the table's zero above the bottom, and the nominal radius, m
+    sizes        joints, the table's zero above the bottom, and the nominal radius, m
+    bulge_scale  sizes of the bulges before the survey, over those of upright walls
     """
     joints_m, zero_m, nominal_m = sizes
-    sites, noise = sites_of(readings, joints_m, zero_m), noise_of(readings)
+    sites = replace(sites_of(readings, joints_m, zero_m), bulge_scale=bulge_scale)
+    noise = noise_of(readings)
     may_go = snooping * np.array([one.of == "offsets" for one in readings])
 
     def field_of(accepted):

@@ -13,6 +13,7 @@ from tankcal.errors import InputError, SolutionError
 from tankcal.pipeline.compared_courses import exchanged_courses
 from tankcal.pipeline.strapped_wall import field_of_readings, find_strapped_wall
 from tankcal.pipeline.strapping_checks import limit_of_repeats
+from tankcal.record import record_of
 from tankcal.survey.strapping import Obstruction
 
 OPEN = {0.9: 146.70404, 1.8: 293.40807, 3.6: 586.81461, 6.0: 978.05449, 8.4: 1369.27879}
@@ -35,6 +36,23 @@ def test_tank_s_1(tmp_path, density):
     found = {height: result.at(height).value_m3 for height in OPEN}
     assert found == pytest.approx(expected, abs=1.6e-5)  # of two rounded figures
     assert codes(result) == set()
+
+
+@pytest.mark.parametrize(
+    ("shares", "code"),
+    [((0.2, 0.8), "cylinders"), ((0.4, 0.6), "cylinders_at_middle"), ((0.2, 0.5), "cylinders")],
+)
+def test_the_record_states_straps_near_the_middle_alone(tmp_path, shares, code):
+    """Where a course bulges, such straps are longer than the mean: the sign is known."""
+    parts = strapped_parts()
+    bottoms = np.concatenate([[0.0], np.cumsum([row[0] for row in S_1])])
+    for row in parts.tables["circumferences"][1:]:
+        course = int(row[1]) - 1
+        low, high = bottoms[course : course + 2]
+        row[2] = round(float(low + shares["ab".index(row[0][-1])] * (high - low)), 6)
+    record = record_of(result_of(parts, tmp_path))
+    choices = {one["code"]: one["value"] for one in record["choices"]}
+    assert choices["between_sections"] == code
 
 
 def test_folder_and_workbook_give_the_same(tmp_path):

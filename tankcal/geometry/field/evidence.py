@@ -54,10 +54,12 @@ def likelihood_of(sites, radius_m, noise_m2, nominal_m, estimate_noise):
     shared, own = _shown(sites)
     own = own + missed + [len(COMPONENTS)] * estimate_noise
     variances = np.diag(noise_m2) if np.ndim(noise_m2) == 2 else noise_m2
-    prior = prior_of(
+    middle, *others = prior_of(
         COMPONENTS, log_covariance(sites.smoothed), variances if estimate_noise else None
     )
-    return Likelihood(parts, np.array(own), np.array(shared), spread, wide, *prior)
+    bulges = [i for i, one in enumerate(COMPONENTS) if one.shape == "mean"]
+    middle[bulges] += 2 * np.log(sites.bulge_scale)  # logarithms of variances
+    return Likelihood(parts, np.array(own), np.array(shared), spread, wide, middle, *others)
 
 
 def _asked(sites):

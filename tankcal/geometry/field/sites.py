@@ -34,6 +34,8 @@ class Sites:
         Course and azimuth of the points that the sites are means of.
     smoothed : bool
         Whether the readings show the wall smoother than it is; see `components.log_covariance`.
+    bulge_scale : float
+        Sizes of the bulges of this wall before the survey, over those of `components.COMPONENTS`.
     """
 
     course: np.ndarray
@@ -45,6 +47,7 @@ class Sites:
     shared: np.ndarray | None = None
     points: tuple | None = None
     smoothed: bool = False
+    bulge_scale: float = 1.0
 
     def __len__(self):
         return len(self.course)
@@ -62,6 +65,7 @@ class Sites:
             shared=None if self.shared is None else self.shared[chosen],
             points=None if self.points is None else _of_courses(*self.points, seen),
             smoothed=self.smoothed,
+            bulge_scale=self.bulge_scale,
         )
 
     @property
