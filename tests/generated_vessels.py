@@ -9,7 +9,7 @@ grow with sqrt(R t) or with R, as the tolerances of shells do. It chose no size 
 Lying: each ring has its own radius; girth welds draw the plate in with the edge effect of a
 cylinder (a damped cosine of length sqrt(R t) / 1.285); the shell bulges between its stiffeners,
 which stand anywhere, by what filling left, or does not; a wave 2 flattens the tank between its saddles and
-hardly over them; plates are too flat or too sharp at long welds that are staggered; the axis sags.
+hardly over them; plates are too flat or too sharp at long welds that are staggered.
 
 Spheres: petals of another curvature than the sphere ("petals": the sagitta of each, either sign,
 and peaks at their welds), columns that push or pull the shell at the equator within sqrt(R t) with
@@ -18,9 +18,10 @@ girth welds of the crowns drawn in ("smooth"). Its weight flattens each by up to
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
-from generated_rings import PLATE_M, Rings, U
+from generated_rings import PLATE_M, TURN, Rings, U
 from generated_solids import FULL_TURN, Ball, _areas_below
 
 EDGE = 1.285  # of a cylinder, Poisson's ratio 0.3: the edge effect fades as exp(-EDGE x/sqrt(R t))
@@ -50,7 +51,7 @@ class WeldedTank:
 
     joints, girth, shape_m, _place = Rings.joints, Rings.girth, Rings.shape_m, Rings._place
 
-    def section(self, ring, zeta, turn=(np.arange(AROUND) + 0.5) * FULL_TURN / AROUND):
+    def section(self, ring, zeta, turn=TURN):
         """(n,) inside radii."""
         s = self.joints[ring] + (zeta + 1) * self.length[ring] / 2
         return self.base[ring] + sum(form(ring, s, turn) for form in self.forms)
@@ -64,7 +65,7 @@ class WeldedTank:
         stretch, found = np.hypot(1, self.tilt), np.zeros(len(dips))
         edges = -np.cos(np.linspace(0, np.pi, PANELS + 1))  # close together at the welds
         for ring, length in enumerate(self.length):
-            for low, high in zip(edges[:-1], edges[1:], strict=True):
+            for low, high in pairwise(edges):
                 for node, weight in zip(nodes, weights, strict=True):
                     zeta = (low + high) / 2 + (high - low) / 2 * node
                     s = self.joints[ring] + (zeta + 1) * length / 2
@@ -135,7 +136,9 @@ def _flattening(rng, ends, radius_m):
     def form(ring, s, turn):
         near = np.exp(-(((s - saddles) / radius_m) ** 2)).sum()
         away = radius_m * (np.abs((turn + np.pi) % FULL_TURN - np.pi) - horn)
-        pressed = -press * np.exp(-((away / 0.15) ** 2)) * np.exp(-(((s - saddles) / 0.2) ** 2)).sum()
+        pressed = (
+            -press * np.exp(-((away / 0.15) ** 2)) * np.exp(-(((s - saddles) / 0.2) ** 2)).sum()
+        )
         return -size * (1 - (1 - over) * min(near, 1)) * np.cos(2 * turn) + pressed
 
     return form

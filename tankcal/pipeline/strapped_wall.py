@@ -44,6 +44,11 @@ from tankcal.pipeline.wall_straps import (
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
 
 STATED_BY_STRAPS, STATED_BY_LINES = (), ("mean",)
+MIDDLE = (0.35, 0.65)  # of a course's height: straps there alone are longer than its mean girth
+BARREL_M = (
+    1.5e-3  # taken off there: half of the median before the survey, as some courses have none
+)
+BULGE_LEFT = 0.8  # sizes of the bulges in U after that, over those of `components.COMPONENTS`
 
 
 @dataclass(frozen=True)
@@ -121,8 +126,15 @@ class TapedWall(ReadWall):
 
 @dataclass(frozen=True)
 class StrappedWall(TapedWall):
-    """The wall of an upright tank as strapped."""
+    """The wall of an upright tank as strapped, with what a `TapedWall` has.
 
+    Attributes
+    ----------
+    barrel_m : float
+        Bulge of each course, middle against joints, that was taken off its straps.
+    """
+
+    barrel_m: float = 0.0
     surveyed_as = "strapped"
     shell = UprightAxis()
     without_inputs = ("offset",)  # of points; a tape has one of its own
@@ -149,7 +161,11 @@ def find_strapped_wall(job, progress, amplitudes=None):
     reduced = reduce_straps(straps, job.survey.shell_temperature_c, 2 * nominal)
     places = [i for i, one in enumerate(reduced) if not one.strap.check]
     term = AreaTerm(*perimeter_excess(straps.shape_sd_m, nominal))
+    joints, zero = joints_of(job), shell_zero(job, None)
     readings = readings_of_straps([reduced[i] for i in places], courses, term)
+    barrel = _barrel_of(job, sites_of(readings, joints, zero).zeta)
+    if barrel:
+        readings = _less_barrel(readings, sites_of(readings, joints, zero).zeta)
     if lines is not None:
         progress(
             message(
@@ -164,11 +180,14 @@ def find_strapped_wall(job, progress, amplitudes=None):
         insets = insets_of(job, job.switches)
         readings += readings_of_offsets(lines, used, courses, insets)
         places += kept
-    joints, zero = joints_of(job), shell_zero(job, None)
     former = readings_of_untold(job, told_courses(job, set()), joints, zero)
     readings, places = readings + former, places + [-1] * len(former)
     readings, tested, field = adjust_readings(
-        readings, (joints, zero, nominal), amplitudes, snooping=job.snooping
+        readings,
+        (joints, zero, nominal),
+        amplitudes,
+        snooping=job.snooping,
+        bulge_scale=BULGE_LEFT if barrel else 1.0,
     )
     return StrappedWall(
         joints_m=joints,
@@ -182,7 +201,30 @@ def find_strapped_wall(job, progress, amplitudes=None):
         plate_sd_m=gauged_plates(job),
         tapes=tapes_used(straps),
         shape_sd_m=straps.shape_sd_m,
+        barrel_m=barrel,
     )
+
+
+def _barrel_of(job, zeta):
+    """Barrel that is taken off straps at heights (n,) of their courses, m; 0: none.
+
+    Reference lines show the profile of a course, and a declared barrel takes its place.
+    """
+    is_known = job.lines is not None or any(one.name == "barrel" for one in job.inputs)
+    share = (zeta + 1) / 2
+    at_middle = np.all((share >= MIDDLE[0]) & (share <= MIDDLE[1]))
+    return BARREL_M if at_middle and not is_known else 0.0
+
+
+def _less_barrel(readings, zeta):
+    """Readings less what a barrel adds to the mean radius of a course at heights (n,).
+
+    The profile (1 - zeta^2)^2 is level at the joints; 8 / 15 is its mean over the course.
+    """
+    rise = BARREL_M * ((1 - zeta**2) ** 2 - 8 / 15)
+    return [
+        replace(one, radius_m=one.radius_m - off) for one, off in zip(readings, rise, strict=True)
+    ]
 
 
 def adjust_readings(readings, sizes, amplitudes, *, snooping, bulge_scale=1.0):
@@ -194,6 +236,8 @@ def adjust_readings(readings, sizes, amplitudes, *, snooping, bulge_scale=1.0):
     joints_m, zero_m, nominal_m = sizes
     sites = replace(sites_of(readings, joints_m, zero_m), bulge_scale=bulge_scale)
     noise = noise_of(readings)
+    if amplitudes is not None:
+        amplitudes = amplitudes.with_bulges(bulge_scale)
     may_go = snooping * np.array([one.of == "offsets" for one in readings])
 
     def field_of(accepted):

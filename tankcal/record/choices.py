@@ -11,7 +11,6 @@ SIGHTS = {  # of a total station, a theodolite or a level: a tape beside photogr
     "direction", "horizontal angle", "vertical angle", "zenith angle", "azimuth",
     "height difference", "slope distance",
 }  # fmt: skip
-MIDDLE = (0.25, 0.75)  # of a course: between its joints a bell is above its mean from 0.24 to 0.76
 
 
 class Choice(Saved):
@@ -27,7 +26,7 @@ def choices_of(result):
     values = {
         "zero": zero_of(result),
         **(_shell_choices(job, result) if result.wall is not None else {}),
-        **(_strapped_choices(job) if result.strapped is not None else {}),
+        **(_strapped_choices(job, result.strapped) if result.strapped is not None else {}),
         **_liquid_choices(result),
         **_radii_choices(result),
         **_ring_choices(result),
@@ -116,7 +115,7 @@ def _measured_by(job, result):
     return found
 
 
-def _strapped_choices(job):
+def _strapped_choices(job, strapped):
     """What was assumed about a shell that a tape was put round."""
     roof = job.roof and job.roof.weighing
     return {
@@ -124,23 +123,13 @@ def _strapped_choices(job):
         "survey": "strapping" if job.lines is None else "reference_line",
         "area_term": "none" if job.strapping.shape_sd_m == 0 else 1000 * job.strapping.shape_sd_m,
         **_top_choice(job),
-        "between_sections": "revolution" if job.lines is not None else _cylinders(job),
+        "between_sections": "cylinders" if job.lines is None else "revolution",
         "tilt": "not_measured" if job.lines is None else "not_applied",
         "course_heights": "along_axis",
         "roof": _fitting_choice(job.switches.roof, roof, roof),
         "form": "learned",
+        **({"barrel": 1000 * strapped.barrel_m} if strapped.barrel_m else {}),
     }
-
-
-def _cylinders(job):
-    """Code of courses as cylinders: the sign of their bulge is known where straps met it alone."""
-    high = np.cumsum([one.height_m for one in job.courses])
-    feet = {one.name: top - one.height_m for one, top in zip(job.courses, high, strict=True)}
-    heights = {one.name: one.height_m for one in job.courses}
-    used = [one for one in job.strapping.straps if not one.check]
-    shares = [(one.level_m - feet[one.course]) / heights[one.course] for one in used]
-    at_middle = all(MIDDLE[0] <= share <= MIDDLE[1] for share in shares)
-    return "cylinders_at_middle" if at_middle else "cylinders"
 
 
 def _ring_choices(result):

@@ -5,7 +5,7 @@ the highest density given the readings (`likelihood`), and the curvature there i
 known.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,6 +42,11 @@ class Amplitudes:
     def noise_dof(self):
         """Degrees of freedom of the noise's factor; inf where it was given."""
         return 2 / self.noise_log_sd**2 if self.noise_log_sd else np.inf
+
+    def with_bulges(self, scale):
+        """The same amplitudes, those of the bulges (the mean radius of a level) times a scale."""
+        bulges = np.array([one.shape == "mean" for one in COMPONENTS])
+        return replace(self, likely_m2=np.where(bulges, scale**2, 1.0) * self.likely_m2)
 
     def assumed_share(self):
         """(components,) variance of each logarithm over what it was beforehand: 1 of an assumed
