@@ -8,8 +8,8 @@ grow with sqrt(R t) or with R, as the tolerances of shells do. It chose no size 
 
 Lying: each ring has its own radius; girth welds draw the plate in with the edge effect of a
 cylinder (a damped cosine of length sqrt(R t) / 1.285); the shell bulges between its stiffeners,
-which stand anywhere, by what filling left, or does not; a wave 2 flattens the tank between its saddles and
-hardly over them; plates are too flat or too sharp at long welds that are staggered.
+which stand anywhere, by what filling left, or does not; a wave 2 flattens the tank between its
+saddles and hardly over them; plates are too flat or too sharp at staggered long welds.
 
 Spheres: petals of another curvature than the sphere ("petals": the sagitta of each, either sign,
 and peaks at their welds), columns that push or pull the shell at the equator within sqrt(R t) with
