@@ -25,7 +25,7 @@ from tankcal.survey.strapping import reduce_straps, tapes_used
 from tankcal.tank.factors import Factor
 from tankcal.tank.rings import WAVES
 
-UPRIGHT_M = 5.0  # radius at which a lying ring bulges as the courses of upright tanks do
+UPRIGHT_M = 7.5  # radius of the measured shell: smaller rings bulge less, as the root of R
 FLATTENED = 0.5  # of the variance round a ring: by its own weight, on saddles
 KIND_OF_WAVES = {"oval": "ovality", "seam": "seams"}
 

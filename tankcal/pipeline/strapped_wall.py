@@ -48,7 +48,7 @@ MIDDLE = (0.35, 0.65)  # of a course's height: straps there alone are longer tha
 BARREL_M = (
     1.5e-3  # taken off there: half of the median before the survey, as some courses have none
 )
-BULGE_LEFT = 0.8  # sizes of the bulges in U after that, over those of `components.COMPONENTS`
+BULGE_LEFT = 0.75  # sizes of the bulges in U after that, over those of `components.COMPONENTS`
 
 
 @dataclass(frozen=True)
@@ -86,6 +86,7 @@ class TapedWall(ReadWall):
     plate_sd_m: dict
     tapes: tuple
     shape_sd_m: float
+    rise_m = 0.0  # of the straps of the first course above its mean radius, by an assumed barrel
 
     @cached_property
     def radius_m(self):
@@ -108,6 +109,7 @@ class TapedWall(ReadWall):
             radius_m=self.radius_m,
             plate_sd_m=self.plate_sd_m,
             tapes=self.tapes,
+            rise_m=self.rise_m,
         )
 
     def factors(self, job, weights):
@@ -138,6 +140,12 @@ class StrappedWall(TapedWall):
     surveyed_as = "strapped"
     shell = UprightAxis()
     without_inputs = ("offset",)  # of points; a tape has one of its own
+
+    @property
+    def rise_m(self):
+        """How far the straps of the first course lie above its mean radius by the barrel, m."""
+        sites = self.field.sites
+        return self.barrel_m * float(np.mean(_rise(sites.zeta[sites.course == 0])))
 
     def lowest_outline(self, azimuth_rad):
         """(x, y) of the axis, and (n,) radii of the first course, m."""
@@ -217,14 +225,16 @@ def _barrel_of(job, zeta):
 
 
 def _less_barrel(readings, zeta):
-    """Readings less what a barrel adds to the mean radius of a course at heights (n,).
-
-    The profile (1 - zeta^2)^2 is level at the joints; 8 / 15 is its mean over the course.
-    """
-    rise = BARREL_M * ((1 - zeta**2) ** 2 - 8 / 15)
+    """Readings less what a barrel adds to the mean radius of a course at heights (n,)."""
+    off = BARREL_M * _rise(zeta)
     return [
-        replace(one, radius_m=one.radius_m - off) for one, off in zip(readings, rise, strict=True)
+        replace(one, radius_m=one.radius_m - rise) for one, rise in zip(readings, off, strict=True)
     ]
+
+
+def _rise(zeta):
+    """(n,) a barrel of one, level at its joints, less its mean over the course, 8 / 15."""
+    return (1 - zeta**2) ** 2 - 8 / 15
 
 
 def adjust_readings(readings, sizes, amplitudes, *, snooping, bulge_scale=1.0):

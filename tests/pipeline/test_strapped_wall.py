@@ -60,6 +60,7 @@ def test_a_barrel_is_taken_off_straps_at_middles_alone(tmp_path, shares, declare
     record = record_of(result)
     choices = {one["code"]: one["value"] for one in record["choices"]}
     assert choices.get("barrel", 0) == barrel_mm
+    assert result.straps.rise_m == pytest.approx(7 / 15 * barrel_mm / 1000)
     scale = (1 - 7 / 15 * barrel_mm / 1000 / 7.2042) ** 2  # of the area of each course
     assert result.at(8.4).value_m3 == pytest.approx(
         OPEN[8.4] * scale, abs=0.02

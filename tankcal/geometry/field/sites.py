@@ -35,7 +35,8 @@ class Sites:
     smoothed : bool
         Whether the readings show the wall smoother than it is; see `components.log_covariance`.
     bulge_scale : float
-        Sizes of the bulges of this wall before the survey, over those of `components.COMPONENTS`.
+        Sizes of bulges and tapers of this wall before the survey, over those of
+        `components.COMPONENTS`. Joints are not scaled: a weld shrinks by the plate, not by R.
     """
 
     course: np.ndarray
