@@ -284,7 +284,8 @@ def _of_first_course(job, straps):
     course = job.courses[0]
     plate = course.thickness_m + course.paint_m
     yield from check_side(job, 2 * (straps.radius_m[0] - plate), plate, 0.0)
-    found, declared = straps.circumference_m[0], job.circumference_m
+    found = straps.circumference_m[0] + straps.rise_m * straps.per_radius  # where it was strapped
+    declared = job.circumference_m
     if declared is not None and abs(found - declared) > limit_of_repeats(found):
         yield Problem(
             "job.toml",

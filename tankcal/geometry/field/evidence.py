@@ -28,6 +28,7 @@ SMALLEST = 1e-8  # of a variance: what is left of a covariance that is followed 
 NEAR_M = 0.02  # along the arc, between azimuths that count as one for the common form
 WIDE_M = 1.0  # of a shared unknown that no prior binds, beside its first estimate
 MOST_FOLLOWED = 80  # values of the common form that are followed through all courses
+BULGES = np.array([one.shape == "mean" and one.orders != "joints" for one in COMPONENTS])
 MOST_ASKED = 200  # readings of a course, whose covariance is inverted at every step of a search
 
 
@@ -54,10 +55,11 @@ def likelihood_of(sites, radius_m, noise_m2, nominal_m, estimate_noise):
     shared, own = _shown(sites)
     own = own + missed + [len(COMPONENTS)] * estimate_noise
     variances = np.diag(noise_m2) if np.ndim(noise_m2) == 2 else noise_m2
-    prior = prior_of(
+    middle, *others = prior_of(
         COMPONENTS, log_covariance(sites.smoothed), variances if estimate_noise else None
     )
-    return Likelihood(parts, np.array(own), np.array(shared), spread, wide, *prior)
+    middle[: len(COMPONENTS)][BULGES] += 2 * np.log(sites.bulge_scale)  # logarithms of variances
+    return Likelihood(parts, np.array(own), np.array(shared), spread, wide, middle, *others)
 
 
 def _asked(sites):

@@ -37,6 +37,9 @@ class Sites:
         one height.
     smoothed : bool
         Whether the readings show the wall smoother than it is; see `components.log_covariance`.
+    bulge_scale : float
+        Sizes of bulges and tapers of this wall before the survey, over those of
+        `components.COMPONENTS`. Joints are not scaled: a weld shrinks by the plate, not by R.
     """
 
     course: np.ndarray
@@ -49,6 +52,7 @@ class Sites:
     points: tuple | None = None
     spans: np.ndarray | None = None
     smoothed: bool = False
+    bulge_scale: float = 1.0
 
     def __len__(self):
         return len(self.course)
@@ -67,6 +71,7 @@ class Sites:
             points=None if self.points is None else _of_courses(*self.points, seen),
             spans=self.course_spans[seen],
             smoothed=self.smoothed,
+            bulge_scale=self.bulge_scale,
         )
 
     @property
