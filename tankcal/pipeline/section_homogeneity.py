@@ -20,6 +20,7 @@ from tankcal.geometry.field.section_noise import bartlett
 from tankcal.messages import list_some, message
 from tankcal.pipeline.survey_warnings import SHOWN, noise_is_estimated, of_points
 
+OF_SCATTER = ("sections_inhomogeneous", "sections_off_stated")  # of measured points alone
 LEVEL = 0.01  # of either test; of 500 valid surveys of generated walls 3 are called unequal
 LEAST_SHARE = 0.5  # of noise: without it 9 % of the surveys with 0.3 mm are called unequal
 

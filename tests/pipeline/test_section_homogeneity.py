@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 from scipy.stats import chi2
 
 import tankcal
+from tankcal.geometry.field.section_noise import bartlett
 from tankcal.geometry.outlines import polar
 from tankcal.pipeline.section_homogeneity import homogeneity_of, warn_of_sections
 from tankcal.pipeline.wall import find_wall
@@ -169,6 +170,17 @@ def drawn_job(seed, folder, factor=1.0, noises=(0.0003, 0.001, 0.002, 0.004, 0.0
     noisy = exact + factor * (measured.radius_m - exact)
     measured = replace(measured, radius_m=np.where(there, noisy, measured.radius_m))
     return job_of(wall, measured, folder, given=bool(rng.random() < 0.8))
+
+
+@pytest.mark.parametrize("seed", [5019, 5196, 5319], ids=["buckle", "coil", "buckle of 0.3 mm"])
+def test_form_that_the_model_lacks_is_no_noise(seed, tmp_path):
+    """A buckle in one course is far from the form of the others; the noise is 0.3 or 1 mm."""
+    job = drawn_job(seed, tmp_path)
+    found = homogeneity_of(job, wall_of(job))
+    sections = [(one.factor, one.dof) for one in found.sections]
+    assert bartlett(*zip(*sections, strict=True))[2] < 1e-6  # as if all of it were noise
+    assert not found.compared
+    assert codes_of(job) == []
 
 
 def share_accused(count, folder, first=20_000):
