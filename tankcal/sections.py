@@ -20,8 +20,6 @@ from tankcal.geometry.circles import (
 from tankcal.geometry.form import Sample, free_columns, harmonics
 from tankcal.geometry.outlines import (
     Outline,
-    evenly_spread,
-    interpolate_outline,
     polar,
     radii_by_coordinates,
     radii_square_to_axis,
@@ -392,8 +390,8 @@ def sample_of(group, xyz_m, covariance_m2, slope, z_m):
 def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
     """Circle and outline of the points of one group.
 
-    The outline of level points is interpolated where they are evenly spread, else smoothed, as that
-    of points that are not level (group.degree above 0).
+    The outline is smoothed by the form and the noise of the wall in every section. So a missing
+    point does not give a section another estimator than its neighbours.
 
     Parameters
     ----------
@@ -435,12 +433,8 @@ def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
     circle = fit_circle(xy, covariance_xy)
     centre = circle.x_m, circle.y_m
     here, zeta = float(group.zeta(group.height_m)), _zeta(group, xyz_m, z_m)
-    if group.degree == 0 and evenly_spread(polar(xy, *centre)[0]):
-        outline = interpolate_outline(xy, *centre, form_m2)
-    else:
-        noise = radial_covariance(xy, centre, covariance_xy)
-        away = zeta - here
-        outline = smooth_outline(xy, *centre, noise, form_m2, away, group.degree)
+    noise = radial_covariance(xy, centre, covariance_xy)
+    outline = smooth_outline(xy, *centre, noise, form_m2, zeta - here, group.degree)
     by_points = own_columns(radii_by_coordinates(outline, xy) @ _by_own(slope))
     return Section(group, circle, outline, by_points)
 

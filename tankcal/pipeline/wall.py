@@ -17,6 +17,7 @@ from tankcal.geometry.shell import WIDE_BAND, course_of, find_shell
 from tankcal.messages import Message, message
 from tankcal.pipeline.overruled_points import decisions_of, refuse_kept
 from tankcal.pipeline.point_covariance import given_covariance, median_sd, radial_sds
+from tankcal.pipeline.section_homogeneity import warn_of_sections
 from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.survey_warnings import (
     noise_is_estimated,
@@ -340,6 +341,7 @@ def warnings_of(job, wall):
         *check_shell(job, wall.shell, wall.sections, sds),
         *warn_of_vague_points(job.points, wall.accepted, sds, wall.shell.noise_m),
         *warn_of_vague_vertical(job.points),
+        *warn_of_sections(job, wall),
     )
 
 

@@ -87,7 +87,7 @@ def _shell_choices(job, result):
         "bottom": _bottom_choice(job),
         **_measured_by(job, result),
         "course_of_points": "section" if any(job.points.section) else "height",
-        "shape": _one_or_mixed(section.outline.kind for section in wall.sections),
+        "shape": "smoothed",
         "between_sections": "field",
         "tilt": _tilt_choice(job, wall.shell),
         "course_heights": "along_axis",
@@ -256,8 +256,3 @@ def _thickness_choice(job, result):
     if not given:
         return "none"
     return "subtracted" if job.switches.plate and job.switches.paint else "off"
-
-
-def _one_or_mixed(values):
-    found = set(values)
-    return found.pop() if len(found) == 1 else "mixed"
