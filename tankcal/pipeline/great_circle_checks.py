@@ -8,7 +8,8 @@ from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline import tape_checks
-from tankcal.pipeline.strapping_checks import NOMINAL_SHARE, check_repeats
+from tankcal.pipeline.nominal_size import allowed_departure_m
+from tankcal.pipeline.strapping_checks import check_repeats
 from tankcal.pipeline.survey_limits import limits_of
 
 FILE = "great_circles.csv"
@@ -98,7 +99,7 @@ def _of_nominal(job, sphere):
             miss_mm=1000 * miss,
         )
         yield Problem(FILE, text, column="reading_m")
-    elif abs(miss) > NOMINAL_SHARE * nominal / 2:
+    elif abs(miss) > allowed_departure_m(job):
         text = message(
             "sphere_unlike_nominal",
             "the sphere comes out {miss_mm:+.0f} mm of radius from the nominal one",

@@ -10,9 +10,9 @@ from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.compared_courses import exchanged_courses
 from tankcal.pipeline.cross_checks import check_side
+from tankcal.pipeline.nominal_size import allowed_departure_m
 from tankcal.pipeline.strapping_checks import (
     FILE,
-    NOMINAL_SHARE,
     check_repeats,
     read_once,
     straps_apart,
@@ -170,7 +170,7 @@ def _of_nominal(job, straps):
     plates = np.array([ring.thickness_m + ring.paint_m for ring in job.rings])
     inside = 2 * float(np.mean(straps.radius_m - plates))
     yield from check_side(job, inside, float(np.mean(plates)), 0.0)
-    if job.diameter_is is None and abs(inside - nominal) > NOMINAL_SHARE * nominal:
+    if job.diameter_is is None and abs(inside - nominal) > 2 * allowed_departure_m(job):
         text = message(
             "rings_unlike_nominal",
             "the rings come out {miss_mm:+.0f} mm of inside diameter from the nominal one",

@@ -12,12 +12,12 @@ from tankcal.messages import message
 from tankcal.pipeline.compared_courses import course_apart, exchanged_courses
 from tankcal.pipeline.cross_checks import check_side, is_size_declared
 from tankcal.pipeline.moved_setups import tested
-from tankcal.pipeline.survey_limits import limit_at
+from tankcal.pipeline.nominal_size import allowed_departure_m
+from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.tape_checks import check_tapes
 from tankcal.pipeline.wall_readings import FORMER
 
 FILE = "circumferences.csv"
-NOMINAL_SHARE = 1 / 500  # of the radius: a course that departs by more from the nominal one
 FLUSH, LEAST_STEP_M = 0.5, 1e-3  # of a step of plates that the outside shows; that shows it
 SHORT_BY_PLATES = 0.5, 1.5  # of a plate: so short of the nominal radius
 FAR_REPEATS = 5  # limits of repeats by which a course is far from all others, at least
@@ -202,7 +202,7 @@ def _of_courses(job, straps):
     nominal = job.tank.nominal_diameter_m / 2
     median = float(np.median(inside))
     steps_inside = _steps_inside(job, straps, plates)
-    if abs(median - nominal) > NOMINAL_SHARE * nominal or steps_inside:
+    if abs(median - nominal) > allowed_departure_m(job) or steps_inside:
         by_plates = abs(median + np.median(plates) - nominal) < abs(median - nominal) / 4
         if by_plates or steps_inside:
             text = message(
@@ -225,7 +225,7 @@ def _of_courses(job, straps):
     far = {
         name: radius - median
         for name, radius in zip(names, inside, strict=True)
-        if abs(radius - median) > NOMINAL_SHARE * nominal
+        if abs(radius - median) > limits_of("nominal_size")["share"] * nominal
     }
     if not far and exchanged is None:
         far = _far_from_others(straps, names, inside)
