@@ -366,11 +366,11 @@ TABLE = (
         ("circumference_off",),
     ),
     Plausible(
-        "check readings, distances between control points",
-        "4 sd",
-        "slope distances 0.1 % too long",
+        "check readings, distances between control points, bases by stadia",
+        "4 sd; no base is rejected",
+        "slope distances 0.1 % too long, the length of another bar",
         "the adjusted survey",
-        ("check_reading_off", "check_point_off", "control_scale"),
+        ("check_reading_off", "check_point_off", "control_scale", "base_rejected"),
     ),
     Plausible(
         "liquid.csv: meter_temperature_c, tank_temperature_c, shell_temperature_c",

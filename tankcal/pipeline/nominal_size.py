@@ -9,9 +9,11 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.job.plausibility import IMPOSSIBLE_MISS, INSIDE, PLATES_TO_INSIDE, unit_guess
-from tankcal.messages import message
+from tankcal.messages import list_some, message
 from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.wall_straps import mean_radii
+
+SHOWN = 5  # names in a message
 
 
 @dataclass(frozen=True)
@@ -159,10 +161,10 @@ def check_size(job, survey):
         return
     if survey.surveyed_as not in ("wall", "radii") or len(found.names) == 1:
         return
-    for name, radius, sd in zip(found.names, found.radius_m, found.sd_m, strict=True):
-        miss = departure_of_size(job, float(radius), plate, float(sd))
-        if miss:
-            yield _course_unlike_drawing(job, name, float(radius), miss)
+    each = zip(found.radius_m, found.sd_m, strict=True)
+    missed = np.array([departure_of_size(job, float(r), plate, float(sd)) for r, sd in each])
+    if np.any(missed):
+        yield _courses_unlike_drawing(job, found.names, missed)
 
 
 def _has_own_line(job, survey):
@@ -183,14 +185,13 @@ def _unlike_drawing(job, radius_m, miss_m):
     return Problem("job.toml", text, column="tank.nominal_diameter_m")
 
 
-def _course_unlike_drawing(job, name, radius_m, miss_m):
+def _courses_unlike_drawing(job, names, missed_m):
     text = message(
         "course_unlike_drawing",
-        "{nominal_m:g} m, but the survey gives {found_m:.4f} m inside course {course!r} alone,"
-        " {miss_mm:+.0f} mm from the drawing: is its plate or a reading of it wrong?",
+        "{nominal_m:g} m, but the survey gives diameters of courses {courses} up to {miss_mm:+.0f}"
+        " mm from the drawing, and of the others not: is a plate or a reading of them wrong?",
         nominal_m=job.tank.nominal_diameter_m,
-        found_m=2 * radius_m,
-        course=name,
-        miss_mm=2000 * miss_m,
+        courses=list_some([names[place] for place in np.flatnonzero(missed_m)], SHOWN),
+        miss_mm=2000 * float(missed_m[np.argmax(np.abs(missed_m))]),
     )
     return Problem("job.toml", text, column="tank.nominal_diameter_m")
