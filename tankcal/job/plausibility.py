@@ -146,7 +146,9 @@ def unit_guess(ratio):
         if abs(ratio / one - 1) <= RATIO_MISS
     )
     text = min(near, key=lambda one: one[0], default=(0.0, ""))[1]
-    return message("ratio_of_sizes", "; they are as {ratio:.3g} to 1{cause}", ratio=ratio, cause=text)
+    return message(
+        "ratio_of_sizes", "; they are as {ratio:.3g} to 1{cause}", ratio=ratio, cause=text
+    )
 
 
 def least_course_mm(diameter_m, head_m, density=LIGHT, shell="carbon_steel"):

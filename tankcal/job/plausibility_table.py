@@ -221,13 +221,12 @@ TABLE = (
         f"{100 * limits.IMPOSSIBLE_MISS:g} % from the median of all (great circles 5 %) and from"
         " the circumference by the drawing, more is a problem; the limits of repeats; courses,"
         " straps of a course and great circles alike",
-        "feet, a metre misread, transposed digits, a strap over a manhole, courses exchanged",
+        "feet, a metre misread, transposed digits, a strap over a manhole",
         "one another, tank.nominal_diameter_m",
         (
             *("circle_of_other_size", "repeats_apart", "strap_apart", "strapped_course_apart"),
             *("strap_contradicts", "strap_of_ring_apart", "circle_contradicts"),
-            *("courses_exchanged", "rings_exchanged", "laps_reversed", "strap_against_lines"),
-            *("strip_upright", "weld_thick"),
+            *("strap_against_lines", "strip_upright", "weld_thick"),
         ),
     ),
     Plausible(

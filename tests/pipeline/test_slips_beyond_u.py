@@ -278,7 +278,7 @@ def targets(offset_mm, count=6):
      ("raised", 35.0, True), ("raised", 101.0, True)],
 )  # fmt: skip
 def test_offsets_of_targets(tmp_path, kind, offset_mm, is_strange):
-    """"raised": the others of 0.3 mm are asked about."""
+    """With checks.targets = raised the other targets, of 0.3 mm, are asked about."""
     parts = strapped_parts(**({} if kind is None else {"checks__targets": kind}))
     parts.tables["targets"] = targets(offset_mm)
     try:

@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from tankcal.job.checking import tell
 from tankcal.job.checks.extent import has_great_circles, has_wall_points, is_metered
 from tankcal.job.checks.strapping import (
