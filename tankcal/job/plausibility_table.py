@@ -219,13 +219,14 @@ TABLE = (
     Plausible(
         "circumferences.reading_m, great_circles.reading_m",
         f"{100 * limits.IMPOSSIBLE_MISS:g} % from the median of all (great circles 5 %) and from"
-        " the circumference by the drawing, more is a problem; the limits of repeats; courses,"
-        " straps of a course and great circles alike",
+        " the circumference by the drawing, more is a problem; ten times the limit of repeats from"
+        " each other, and from others of a course, a ring or a sphere; a course that stands apart"
+        " 1 in 1000 of the radius from the others",
         "feet, a metre misread, transposed digits, a strap over a manhole",
         "one another, tank.nominal_diameter_m",
         (
-            *("circle_of_other_size", "repeats_apart", "strap_apart", "strapped_course_apart"),
-            *("strap_contradicts", "strap_of_ring_apart", "circle_contradicts"),
+            *("circle_of_other_size", "repeats_far", "strap_far", "strapped_course_far"),
+            *("strap_contradicts_far", "strap_of_ring_far", "circle_contradicts_far"),
             *("strap_against_lines", "strip_upright", "weld_thick"),
         ),
     ),

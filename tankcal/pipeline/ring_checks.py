@@ -12,8 +12,10 @@ from tankcal.pipeline.compared_courses import exchanged_courses
 from tankcal.pipeline.cross_checks import check_side
 from tankcal.pipeline.nominal_size import allowed_departure_m
 from tankcal.pipeline.strapping_checks import (
+    FAR_LIMITS,
     FILE,
     check_repeats,
+    limit_of_repeats,
     read_once,
     straps_apart,
 )
@@ -44,16 +46,21 @@ def _problem(text, row=None, column="reading_m"):
 def _of_pairs(job, straps):
     """A strap that stands far from the others of its ring, further than rings taper."""
     for size, one, count, usual in straps_apart(names_of(job.rings), straps):
-        text = message(
-            "strap_of_ring_apart",
+        template = (
             "the {count} straps of ring {ring!r} differ by {apart_mm:.1f} mm, those of other rings"
             " by {usual_mm:.1f} mm: is one of them misread, over an obstruction or not square to"
-            " the axis?",
-            count=count,
-            ring=one.strap.course,
-            apart_mm=1000 * size,
-            usual_mm=1000 * usual,
+            " the axis?"
         )
+        values = {
+            "count": count,
+            "ring": one.strap.course,
+            "apart_mm": 1000 * size,
+            "usual_mm": 1000 * usual,
+        }
+        if size > FAR_LIMITS * limit_of_repeats(one.circumference_m, LIMITS):
+            text = message("strap_of_ring_far", template, **values)
+        else:
+            text = message("strap_of_ring_apart", template, **values)
         yield _problem(text, one.strap.row)
 
 

@@ -21,6 +21,7 @@ FILE = "circumferences.csv"
 FLUSH, LEAST_STEP_M = 0.5, 1e-3  # of a step of plates that the outside shows; that shows it
 SHORT_BY_PLATES = 0.5, 1.5  # of a plate: so short of the nominal radius
 FAR_REPEATS = 5  # limits of repeats by which a course is far from all others, at least
+FAR_LIMITS = 10  # limits of repeats from which a reading is grossly wrong: 5 mm of radius
 FARTHEST_M = 1.0  # sd of a departure that something controls
 APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826  # of differences within a course
 
@@ -114,13 +115,15 @@ def _of_contradicted(straps, together):
             "miss_mm": 1000 * departure * straps.per_radius,
             "w": abs(w),
         }
-        if accepted:
-            text = message(
-                "strap_contradicts",
-                "circumference {name!r} of course {course!r} is {miss_mm:+.1f} mm from what the"
-                " points and all other straps show (w = {w:.1f}): which of them is wrong?",
-                **named,
-            )
+        template = (
+            "circumference {name!r} of course {course!r} is {miss_mm:+.1f} mm from what the points"
+            " and all other straps show (w = {w:.1f}): which of them is wrong?"
+        )
+        far = abs(named["miss_mm"]) > 1000 * FAR_LIMITS * limit_of_repeats(one.circumference_m)
+        if accepted and far:
+            text = message("strap_contradicts_far", template, **named)
+        elif accepted:
+            text = message("strap_contradicts", template, **named)
         else:
             text = message(
                 "strap_set_aside",
@@ -144,32 +147,38 @@ def check_repeats(straps, table="repeats"):
         if len(several) < 2:
             continue
         found = [one.circumference_m for one in several]
-        limit = limit_of_repeats(found[0], table)
-        if max(found) - min(found) > limit:
-            text = message(
-                "repeats_apart",
+        limit, apart = limit_of_repeats(found[0], table), max(found) - min(found)
+        if apart > limit:
+            template = (
                 "the readings of circumference {name!r} differ by {apart_mm:.1f} mm; expected at"
-                " most {limit_mm:g} mm",
-                name=name,
-                apart_mm=1000 * (max(found) - min(found)),
-                limit_mm=1000 * limit,
+                " most {limit_mm:g} mm"
             )
+            values = {"name": name, "apart_mm": 1000 * apart, "limit_mm": 1000 * limit}
+            if apart > FAR_LIMITS * limit:
+                text = message("repeats_far", template, **values)
+            else:
+                text = message("repeats_apart", template, **values)
             yield _problem(text, several[int(np.argmax(found))].strap)
 
 
 def _of_pairs(job, straps):
     """A strap that stands far from the others of its course, further than courses taper."""
     for size, one, count, usual in straps_apart([course.name for course in job.courses], straps):
-        text = message(
-            "strap_apart",
+        template = (
             "the {count} straps of course {course!r} differ by {apart_mm:.1f} mm, those of"
             " other courses by {usual_mm:.1f} mm: is one of them misread, over an obstruction"
-            " or not level?",
-            count=count,
-            course=one.strap.course,
-            apart_mm=1000 * size,
-            usual_mm=1000 * usual,
+            " or not level?"
         )
+        values = {
+            "count": count,
+            "course": one.strap.course,
+            "apart_mm": 1000 * size,
+            "usual_mm": 1000 * usual,
+        }
+        if size > FAR_LIMITS * limit_of_repeats(one.circumference_m):
+            text = message("strap_far", template, **values)
+        else:
+            text = message("strap_apart", template, **values)
         yield _problem(text, one.strap)
 
 
@@ -219,24 +228,26 @@ def _of_courses(job, straps):
                 miss_mm=1000 * (median - nominal),
             )
         yield _problem(text)
+    share = limits_of("nominal_size")["share"] * nominal
     strapped = {one.strap.course for one in straps.reduced}
     both = [i for i, name in enumerate(names) if name in strapped]  # lines tell the others
     exchanged = exchanged_courses(straps.radius_m, plates, both)
     far = {
         name: radius - median
         for name, radius in zip(names, inside, strict=True)
-        if abs(radius - median) > limits_of("nominal_size")["share"] * nominal
+        if abs(radius - median) > share
     }
     if not far and exchanged is None:
         far = _far_from_others(straps, names, inside)
     for name, away in far.items():
-        text = message(
-            "strapped_course_apart",
+        template = (
             "course {name!r} comes out {miss_mm:+.1f} mm of radius from the others: did its straps"
-            " lie over an obstruction, or is its plate another one?",
-            name=name,
-            miss_mm=1000 * away,
+            " lie over an obstruction, or is its plate another one?"
         )
+        if abs(away) > share / 2:
+            text = message("strapped_course_far", template, name=name, miss_mm=1000 * away)
+        else:
+            text = message("strapped_course_apart", template, name=name, miss_mm=1000 * away)
         yield _problem(text, column="course")
     if exchanged is not None:
         one, other, left, steps = exchanged
