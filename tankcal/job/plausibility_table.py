@@ -221,12 +221,12 @@ TABLE = (
         f"{100 * limits.IMPOSSIBLE_MISS:g} % from the median of all (great circles 5 %) and from"
         " the circumference by the drawing, more is a problem; ten times the limit of repeats from"
         " each other, and from others of a course, a ring or a sphere; a course that stands apart"
-        " 1 in 1000 of the radius from the others",
+        " 1 in 1000 of the radius from the others, a ring a plate and 1 in 500",
         "feet, a metre misread, transposed digits, a strap over a manhole",
         "one another, tank.nominal_diameter_m",
         (
             *("circle_of_other_size", "repeats_far", "strap_far", "strapped_course_far"),
-            *("strap_contradicts_far", "strap_of_ring_far", "circle_contradicts_far"),
+            *("strap_contradicts_far", "strap_of_ring_far", "circle_contradicts_far", "ring_far"),
             *("strap_against_lines", "strip_upright", "weld_thick"),
         ),
     ),
@@ -418,10 +418,11 @@ TABLE = (
         "liquid.volume_m3",
         f"standard deviation of a batch by its meter at most {100 * limits.BATCH_SD:g} % of it;"
         " well above a bottom and well within a lying tank 0.7 to 1.4 times what the nominal sizes"
-        " hold between its dips, most of them over 5 or under 0.2 times a problem",
+        " hold between its dips, most of them over 5 or under 0.2 times a problem; no cause of"
+        " liquid and geometry beyond 6.6 sd",
         "litres, gallons, barrels, a batch missing, a valve that passes, a dip misread",
         "meters.toml, nominal sizes",
-        ("batch_too_small", "batch_unlike_sizes", "batches_in_other_unit"),
+        ("batch_too_small", "batch_unlike_sizes", "batches_in_other_unit", "liquid_far_because"),
     ),
 )
 CODES = frozenset(code for one in TABLE for code in one.codes)

@@ -19,6 +19,7 @@ from tankcal.pipeline.strapping_checks import (
     read_once,
     straps_apart,
 )
+from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.tape_checks import check_tapes
 from tankcal.pipeline.wall_readings import names_of
 
@@ -33,6 +34,7 @@ def check_rings(job, wall):
         *check_tapes(job, straps),
         *check_repeats(straps, LIMITS),
         *_of_pairs(job, straps),
+        *_of_others(job, straps),
         *_of_laps(job, straps),
         *_of_nominal(job, straps),
         *_uncontrolled(job, wall),
@@ -62,6 +64,27 @@ def _of_pairs(job, straps):
         else:
             text = message("strap_of_ring_apart", template, **values)
         yield _problem(text, one.strap.row)
+
+
+def _of_others(job, straps):
+    """A ring whose radius differs from the median of all by more than a lap and a tolerance."""
+    plates = np.array([ring.thickness_m + ring.paint_m for ring in job.rings])
+    inside, names = straps.radius_m - plates, names_of(job.rings)
+    if len(names) < 3:
+        return
+    median = float(np.median(inside))
+    allowed = limits_of("nominal_size")["share"] * median + float(np.max(plates))
+    for name, radius in zip(names, inside, strict=True):
+        if abs(radius - median) > allowed:
+            text = message(
+                "ring_far",
+                "ring {ring!r} comes out {miss_mm:+.1f} mm of radius from the others, more than a"
+                " lap: is a strap of it misread or over an obstruction, or is its plate another"
+                " one?",
+                ring=name,
+                miss_mm=1000 * (radius - median),
+            )
+            yield _problem(text, column="ring")
 
 
 def _of_laps(job, straps):
