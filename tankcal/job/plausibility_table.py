@@ -221,7 +221,8 @@ TABLE = (
         f"{100 * limits.IMPOSSIBLE_MISS:g} % from the median of all (great circles 5 %) and from"
         " the circumference by the drawing, more is a problem; ten times the limit of repeats from"
         " each other, and from others of a course, a ring or a sphere; a course that stands apart"
-        " 1 in 1000 of the radius from the others, a ring a plate and 1 in 500",
+        " 1 in 1000 of the radius from the others, a ring a plate (half of one where laps are"
+        " given) and 1 in 500",
         "feet, a metre misread, transposed digits, a strap over a manhole",
         "one another, tank.nominal_diameter_m",
         (

@@ -72,8 +72,14 @@ def _of_others(job, straps):
     inside, names = straps.radius_m - plates, names_of(job.rings)
     if len(names) < 3:
         return
+    laps = [ring.lap for ring in job.rings]
+    step = float(np.max(plates))  # of unknown laps
+    if None not in laps:
+        outer = np.array([one == "outer" for one in laps])
+        inside = inside - outer * _inner_plates(plates, outer)
+        step *= FITS
     median = float(np.median(inside))
-    allowed = limits_of("nominal_size")["share"] * median + float(np.max(plates))
+    allowed = limits_of("nominal_size")["share"] * median + step
     for name, radius in zip(names, inside, strict=True):
         if abs(radius - median) > allowed:
             text = message(
