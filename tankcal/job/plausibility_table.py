@@ -204,7 +204,7 @@ TABLE = (
             *("size_unlike_drawing", "points_unlike_drawing", "points_too_wide"),
             *("course_unlike_drawing", "size_in_other_unit", "wall_unlike_nominal"),
             *("strapped_unlike_nominal", "rings_unlike_nominal", "sphere_unlike_nominal"),
-            *("circumference_of_inside", "circles_of_inside", "strapped_unlike_declared"),
+            *("circumference_of_inside", "strapped_unlike_declared"),
         ),
     ),
     Plausible(

@@ -10,7 +10,7 @@ from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.compared_courses import exchanged_courses
 from tankcal.pipeline.cross_checks import check_side
-from tankcal.pipeline.nominal_size import allowed_departure_m
+from tankcal.pipeline.nominal_size import allowed_departure_m, departure_of_size
 from tankcal.pipeline.strapping_checks import (
     FAR_LIMITS,
     FILE,
@@ -207,11 +207,12 @@ def _of_nominal(job, straps):
     inside = 2 * float(np.mean(straps.radius_m - plates))
     yield from check_side(job, inside, float(np.mean(plates)), 0.0)
     if job.diameter_is is None and abs(inside - nominal) > 2 * allowed_departure_m(job):
-        text = message(
-            "rings_unlike_nominal",
-            "the rings come out {miss_mm:+.0f} mm of inside diameter from the nominal one",
-            miss_mm=1000 * (inside - nominal),
-        )
+        template = "the rings come out {miss_mm:+.0f} mm of inside diameter from the nominal one"
+        miss = 1000 * (inside - nominal)
+        if departure_of_size(job, inside / 2, float(np.mean(plates))):
+            text = message("rings_unlike_nominal", template, miss_mm=miss)
+        else:
+            text = message("rings_short_by_plates", template, miss_mm=miss)
         yield _problem(text)
 
 

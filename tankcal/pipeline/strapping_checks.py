@@ -12,7 +12,7 @@ from tankcal.messages import message
 from tankcal.pipeline.compared_courses import course_apart, exchanged_courses
 from tankcal.pipeline.cross_checks import check_side, is_size_declared
 from tankcal.pipeline.moved_setups import tested
-from tankcal.pipeline.nominal_size import allowed_departure_m
+from tankcal.pipeline.nominal_size import allowed_departure_m, departure_of_size, nominal_radius_m
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.tape_checks import check_tapes
 from tankcal.pipeline.wall_readings import FORMER
@@ -20,6 +20,7 @@ from tankcal.pipeline.wall_readings import FORMER
 FILE = "circumferences.csv"
 FLUSH, LEAST_STEP_M = 0.5, 1e-3  # of a step of plates that the outside shows; that shows it
 SHORT_BY_PLATES = 0.5, 1.5  # of a plate: so short of the nominal radius
+SURELY_FLUSH, SURELY_SHORT_BY_PLATES = 0.25, (0.75, 1.25)  # not plates whose middles are flush
 FAR_REPEATS = 5  # limits of repeats by which a course is far from all others, at least
 FAR_LIMITS = 10  # limits of repeats from which a reading is grossly wrong: 5 mm of radius
 FARTHEST_M = 1.0  # sd of a departure that something controls
@@ -208,25 +209,28 @@ def _of_courses(job, straps):
     """Inside radii against the nominal one, and pairs of courses that fit better exchanged."""
     plates = np.array([course.thickness_m + course.paint_m for course in job.courses])
     inside, names = straps.radius_m - plates, [course.name for course in job.courses]
-    nominal = job.tank.nominal_diameter_m / 2
-    median = float(np.median(inside))
-    steps_inside = _steps_inside(job, straps, plates)
+    nominal, median = nominal_radius_m(job, float(plates[0])), float(np.median(inside))
+    slope, short = _slope_and_shortness(job, straps, plates)
+    low, high = SHORT_BY_PLATES
+    steps_inside = slope < FLUSH and low < short < high
     if abs(median - nominal) > allowed_departure_m(job) or steps_inside:
-        by_plates = abs(median + np.median(plates) - nominal) < abs(median - nominal) / 4
-        if by_plates or steps_inside:
-            text = message(
-                "circumference_of_inside",
-                "the courses come out {miss_mm:+.0f} mm of radius from the nominal one, about"
-                " their plates: is the nominal diameter that of the outside, or are the"
-                " circumferences those of the inside?",
-                miss_mm=1000 * (median - nominal),
-            )
-        else:
+        miss, plate = 1000 * (median - nominal), float(np.median(plates))
+        template = (
+            "the courses come out {miss_mm:+.0f} mm of radius from the nominal one, about their"
+            " plates: is the nominal diameter that of the outside, or are the circumferences those"
+            " of the inside?"
+        )
+        low, high = SURELY_SHORT_BY_PLATES
+        if slope < SURELY_FLUSH and low < short < high:
+            text = message("circumference_of_inside", template, miss_mm=miss)
+        elif departure_of_size(job, median, plate) and not steps_inside:
             text = message(
                 "strapped_unlike_nominal",
                 "the courses come out {miss_mm:+.0f} mm of radius from the nominal one",
-                miss_mm=1000 * (median - nominal),
+                miss_mm=miss,
             )
+        else:
+            text = message("courses_short_by_plates", template, miss_mm=miss)
         yield _problem(text)
     share = limits_of("nominal_size")["share"] * nominal
     strapped = {one.strap.course for one in straps.reduced}
@@ -274,20 +278,22 @@ def _far_from_others(straps, names, inside_m):
     return {} if found is None or names[found[0]] in told else {names[found[0]]: found[1]}
 
 
-def _steps_inside(job, straps, plates_m):
-    """Whether the courses are short of the nominal radius by about their plates, and the outside
-    does not step with these: circumferences of the inside, or plates that are flush outside.
+def _slope_and_shortness(job, straps, plates_m):
+    """Step of the outside over that of the plates, and shortness of the nominal radius in plates.
+
+    The slope is 1 where plates are flush inside, 0 of circumferences of the inside and of plates
+    that are flush outside; inf where the steps do not show it.
     """
+    plate = float(np.median(plates_m))
+    short = job.tank.nominal_diameter_m / 2 - float(np.median(straps.radius_m - plates_m))
+    short = short / plate if plate > 0 else 0.0
     strapped = {one.strap.course for one in straps.reduced}
     if len(strapped) < len(plates_m) or np.ptp(plates_m) < LEAST_STEP_M:
-        return False
+        return np.inf, short
     if job.diameter_is is not None:  # `check_side` looks to the plate
-        return False
+        return np.inf, short
     steps = plates_m - plates_m.mean()
-    slope = straps.radius_m @ steps / (steps @ steps)  # 1 where they are flush inside
-    short = job.tank.nominal_diameter_m / 2 - float(np.median(straps.radius_m - plates_m))
-    low, high = SHORT_BY_PLATES
-    return slope < FLUSH and low < short / float(np.median(plates_m)) < high
+    return float(straps.radius_m @ steps / (steps @ steps)), short
 
 
 def _of_first_course(job, straps):
