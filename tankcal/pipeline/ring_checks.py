@@ -67,28 +67,27 @@ def _of_pairs(job, straps):
 
 
 def _of_others(job, straps):
-    """A ring whose radius differs from the median of all by more than a lap and a tolerance."""
+    """A ring whose radius differs from the median of the others of its lap by more than a part of
+    a plate and a tolerance; where laps are not given, by a plate more.
+    """
     plates = np.array([ring.thickness_m + ring.paint_m for ring in job.rings])
     inside, names = straps.radius_m - plates, names_of(job.rings)
-    if len(names) < 3:
-        return
-    laps = [ring.lap for ring in job.rings]
-    step = float(np.max(plates))  # of unknown laps
-    if None not in laps:
-        outer = np.array([one == "outer" for one in laps])
-        inside = inside - outer * _inner_plates(plates, outer)
-        step *= FITS
-    median = float(np.median(inside))
-    allowed = limits_of("nominal_size")["share"] * median + step
-    for name, radius in zip(names, inside, strict=True):
-        if abs(radius - median) > allowed:
+    laps = np.array([ring.lap or "" for ring in job.rings])
+    step = float(np.max(plates)) * (FITS if np.all(laps != "") else 1.0)
+    if np.any(laps == ""):
+        laps[:] = ""
+    for lap in dict.fromkeys(laps.tolist()):
+        alike = np.flatnonzero(laps == lap)
+        median = float(np.median(inside[alike]))
+        allowed = limits_of("nominal_size")["share"] * median + step
+        for place in alike[np.abs(inside[alike] - median) > allowed]:
             text = message(
                 "ring_far",
                 "ring {ring!r} comes out {miss_mm:+.1f} mm of radius from the others, more than a"
                 " lap: is a strap of it misread or over an obstruction, or is its plate another"
                 " one?",
-                ring=name,
-                miss_mm=1000 * (radius - median),
+                ring=names[place],
+                miss_mm=1000 * float(inside[place] - median),
             )
             yield _problem(text, column="ring")
 
