@@ -118,13 +118,13 @@ def _contradicted(sphere):
                 "circle {name!r} is {miss_mm:+.1f} mm from what all others show (w = {w:.1f}): is"
                 " it misread, off its great circle or over an obstruction?"
             )
-            values = {"name": strap.name, "miss_mm": 1000 * missed[place], "w": abs(w)}
+            name, miss, size = strap.name, 1000 * missed[place], abs(w)
             if abs(missed[place]) > FAR_LIMITS * limit_of_repeats(
                 sphere.reduced[place].circumference_m
             ):
-                text = message("circle_contradicts_far", template, **values)
+                text = message("circle_contradicts_far", template, name=name, miss_mm=miss, w=size)
             else:
-                text = message("circle_contradicts", template, **values)
+                text = message("circle_contradicts", template, name=name, miss_mm=miss, w=size)
             yield Problem(FILE, text, strap.row, "reading_m")
     for place in np.setdiff1d(np.arange(len(missed)), sphere.adjusted):
         apart = abs(missed[place]) / sphere.sd_of_check_m(place)

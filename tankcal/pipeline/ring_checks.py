@@ -53,16 +53,25 @@ def _of_pairs(job, straps):
             " by {usual_mm:.1f} mm: is one of them misread, over an obstruction or not square to"
             " the axis?"
         )
-        values = {
-            "count": count,
-            "ring": one.strap.course,
-            "apart_mm": 1000 * size,
-            "usual_mm": 1000 * usual,
-        }
+        ring, apart, least = one.strap.course, 1000 * size, 1000 * usual
         if size > FAR_LIMITS * limit_of_repeats(one.circumference_m, LIMITS):
-            text = message("strap_of_ring_far", template, **values)
+            text = message(
+                "strap_of_ring_far",
+                template,
+                count=count,
+                ring=ring,
+                apart_mm=apart,
+                usual_mm=least,
+            )
         else:
-            text = message("strap_of_ring_apart", template, **values)
+            text = message(
+                "strap_of_ring_apart",
+                template,
+                count=count,
+                ring=ring,
+                apart_mm=apart,
+                usual_mm=least,
+            )
         yield _problem(text, one.strap.row)
 
 

@@ -110,27 +110,30 @@ def _of_contradicted(straps, together):
     ]
     for place, accepted, w, departure in (*apart.values(), *single):
         one = straps.reduced[place]
-        named = {
-            "name": one.strap.name,
-            "course": one.strap.course,
-            "miss_mm": 1000 * departure * straps.per_radius,
-            "w": abs(w),
-        }
+        name, course, size = one.strap.name, one.strap.course, abs(w)
+        miss = 1000 * departure * straps.per_radius
         template = (
             "circumference {name!r} of course {course!r} is {miss_mm:+.1f} mm from what the points"
             " and all other straps show (w = {w:.1f}): which of them is wrong?"
         )
-        far = abs(named["miss_mm"]) > 1000 * FAR_LIMITS * limit_of_repeats(one.circumference_m)
+        far = abs(miss) > 1000 * FAR_LIMITS * limit_of_repeats(one.circumference_m)
         if accepted and far:
-            text = message("strap_contradicts_far", template, **named)
+            text = message(
+                "strap_contradicts_far", template, name=name, course=course, miss_mm=miss, w=size
+            )
         elif accepted:
-            text = message("strap_contradicts", template, **named)
+            text = message(
+                "strap_contradicts", template, name=name, course=course, miss_mm=miss, w=size
+            )
         else:
             text = message(
                 "strap_set_aside",
                 "circumference {name!r} of course {course!r} is {miss_mm:+.1f} mm from what the"
                 " points and all other straps show (w = {w:.1f}) and was set aside",
-                **named,
+                name=name,
+                course=course,
+                miss_mm=miss,
+                w=size,
             )
         yield _problem(text, one.strap)
 
@@ -154,11 +157,11 @@ def check_repeats(straps, table="repeats"):
                 "the readings of circumference {name!r} differ by {apart_mm:.1f} mm; expected at"
                 " most {limit_mm:g} mm"
             )
-            values = {"name": name, "apart_mm": 1000 * apart, "limit_mm": 1000 * limit}
+            mm, most = 1000 * apart, 1000 * limit
             if apart > FAR_LIMITS * limit:
-                text = message("repeats_far", template, **values)
+                text = message("repeats_far", template, name=name, apart_mm=mm, limit_mm=most)
             else:
-                text = message("repeats_apart", template, **values)
+                text = message("repeats_apart", template, name=name, apart_mm=mm, limit_mm=most)
             yield _problem(text, several[int(np.argmax(found))].strap)
 
 
@@ -170,16 +173,15 @@ def _of_pairs(job, straps):
             " other courses by {usual_mm:.1f} mm: is one of them misread, over an obstruction"
             " or not level?"
         )
-        values = {
-            "count": count,
-            "course": one.strap.course,
-            "apart_mm": 1000 * size,
-            "usual_mm": 1000 * usual,
-        }
+        course, apart, least = one.strap.course, 1000 * size, 1000 * usual
         if size > FAR_LIMITS * limit_of_repeats(one.circumference_m):
-            text = message("strap_far", template, **values)
+            text = message(
+                "strap_far", template, count=count, course=course, apart_mm=apart, usual_mm=least
+            )
         else:
-            text = message("strap_apart", template, **values)
+            text = message(
+                "strap_apart", template, count=count, course=course, apart_mm=apart, usual_mm=least
+            )
         yield _problem(text, one.strap)
 
 
