@@ -10,6 +10,7 @@ from tankcal.pipeline.liquid_naming import causes_in_words, is_steady_leak, leak
 from tankcal.pipeline.survey_limits import limits_of
 
 TOLD = 3  # steps that are told one by one
+FAR = 2 * CRITICAL  # test quantity of a cause, from which it moves the table beyond U
 CONTROLLED = 1e-6  # redundancy of a reading below which nothing tests it
 HIDDEN_U = 2.0  # change of a volume, in its U, by an error that no test shows: more is told
 
@@ -41,13 +42,15 @@ def _disagreement(metering, found):
     if found.probability >= limits_of("liquid")["global_probability"] and not named:
         return
     if named:
-        text = message(
-            "liquid_disagrees_because",
+        template = (
             "liquid and geometry disagree, at {w:.1f} times the standard deviation; the likeliest "
-            "cause is {cause}",
-            w=abs(named[0].w),
-            cause=causes_in_words(named),
+            "cause is {cause}"
         )
+        w, cause = abs(named[0].w), causes_in_words(named)
+        if w > FAR:
+            text = message("liquid_far_because", template, w=w, cause=cause)
+        else:
+            text = message("liquid_disagrees_because", template, w=w, cause=cause)
     else:
         text = message(
             "liquid_disagrees",

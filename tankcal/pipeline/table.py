@@ -10,6 +10,7 @@ import numpy as np
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
+from tankcal.pipeline.nominal_size import check_size
 from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
 from tankcal.pipeline.surveying import is_surveyed_as
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
@@ -156,9 +157,11 @@ def check_table(job, survey, made, sighting=None):
     -------
     tuple of Problem
     """
+    of_size = check_size(job, survey)
     if is_surveyed_as(survey, "radii"):
         survey = survey.surveyed
     return (
+        *of_size,
         *_doubts_of_survey(job, survey, made.top_m),
         *_doubts_of_sights(job, survey, sighting),
         *warn_of_undeclared(_undeclared(job, survey, made.body)),

@@ -35,6 +35,7 @@ OF_READINGS = (  # warnings that only true readings can give, or a drawing, whic
     *("size_told_by_distances", "size_told_by_one_course"),
     *("reading_copied", "line_copied", "no_control_readings"),
     *("repeats_apart", "strap_apart", "strapped_course_apart", "courses_exchanged"),
+    *("repeats_far", "strap_far", "strapped_course_far"),
     *("lines_of_inside", "many_offsets_set_aside", "setup_set_aside"),
     *OF_SCATTER,
 )
