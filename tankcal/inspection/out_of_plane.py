@@ -132,6 +132,25 @@ def explained_share(z_m, residual_m):
     return float(1 - left / scatter), gradient
 
 
+def explained_shares(z_m, residual_operator):
+    """R2 of many levellings of the same points.
+
+    Parameters
+    ----------
+    z_m : ndarray, shape (m, n)
+    residual_operator : ndarray, shape (n, n)
+        Of a `Plane`.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+    """
+    about_mean = z_m - z_m.mean(axis=1, keepdims=True)
+    left = np.sum((z_m @ residual_operator.T) ** 2, axis=1)
+    scatter = np.sum(about_mean**2, axis=1)
+    return np.where(np.ptp(z_m, axis=1) < LEVEL_M, 1.0, 1 - left / np.maximum(scatter, LEVEL_M**2))
+
+
 @dataclass(frozen=True)
 class Neighbours:
     """Points between their neighbours along the shell.
@@ -298,8 +317,7 @@ def largest_curvature_of(azimuth_rad, z_m, radius_m, highest):
     """
     operator = _least_squares(harmonics(azimuth_rad, highest))
     unknowns = operator @ z_m
-    squares = np.repeat(np.arange(1, highest + 1), 2) ** 2.0
-    weights = np.concatenate([[0.0, 0.0, 0.0], squares[2:]]) / radius_m**2
+    weights = _curvature_weights(radius_m, highest)
 
     def size(t):
         return np.abs(harmonics(np.atleast_1d(t), highest) @ (weights * unknowns))
@@ -317,3 +335,29 @@ def largest_curvature_of(azimuth_rad, z_m, radius_m, highest):
     rows = harmonics([at], highest)[0] * weights
     sign = -1.0 if rows @ unknowns < 0 else 1.0
     return Curvature(highest, float(size(at)[0]), float(at % (2 * np.pi)), sign * rows @ operator)
+
+
+def curvature_rows(azimuth_rad, radius_m, highest):
+    """Curvature of the harmonics of U on an even grid of azimuths, as a linear map of elevations.
+
+    Parameters
+    ----------
+    azimuth_rad : ndarray, shape (n,)
+    radius_m : float
+    highest : int
+        As of `largest_curvature_of`.
+
+    Returns
+    -------
+    ndarray, shape (m, n)
+        Curvature, 1/m, is rows @ z; the grid misses at most 0.5 % of the largest.
+    """
+    grid = np.arange(_STEPS * highest) * 2 * np.pi / (_STEPS * highest)
+    columns = harmonics(grid, highest) * _curvature_weights(radius_m, highest)
+    return columns @ _least_squares(harmonics(azimuth_rad, highest))
+
+
+def _curvature_weights(radius_m, highest):
+    """(2 highest + 1,) k^2 / R^2 of each harmonic, 0 of the plane."""
+    squares = np.repeat(np.arange(1, highest + 1), 2) ** 2.0
+    return np.concatenate([[0.0, 0.0, 0.0], squares[2:]]) / radius_m**2
