@@ -19,6 +19,7 @@ from tankcal.geometry.form import harmonics
 
 LEVEL_M = 1e-9  # points that differ by less are level: what is left is rounding
 NEARLY = 1.25  # times as many points as a subset needs: none is left out
+_COARSE_STEPS = 16  # of simulated curvatures, along the shortest wave
 _STEPS = 32  # of the search for the largest curvature, along the shortest wave
 
 
@@ -130,25 +131,6 @@ def explained_share(z_m, residual_m):
         return 1.0, np.zeros(len(z_m))
     gradient = -2 * residual_m / scatter + 2 * left * about_mean / scatter**2
     return float(1 - left / scatter), gradient
-
-
-def explained_shares(z_m, residual_operator):
-    """R2 of many levellings of the same points.
-
-    Parameters
-    ----------
-    z_m : ndarray, shape (m, n)
-    residual_operator : ndarray, shape (n, n)
-        Of a `Plane`.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-    """
-    about_mean = z_m - z_m.mean(axis=1, keepdims=True)
-    left = np.sum((z_m @ residual_operator.T) ** 2, axis=1)
-    scatter = np.sum(about_mean**2, axis=1)
-    return np.where(np.ptp(z_m, axis=1) < LEVEL_M, 1.0, 1 - left / np.maximum(scatter, LEVEL_M**2))
 
 
 @dataclass(frozen=True)
@@ -350,9 +332,10 @@ def curvature_rows(azimuth_rad, radius_m, highest):
     Returns
     -------
     ndarray, shape (m, n)
-        Curvature, 1/m, is rows @ z; the grid misses at most 0.5 % of the largest.
+        Curvature, 1/m, is rows @ z; the grid misses at most 2 % of the largest.
     """
-    grid = np.arange(_STEPS * highest) * 2 * np.pi / (_STEPS * highest)
+    count = _COARSE_STEPS * highest
+    grid = np.arange(count) * 2 * np.pi / count
     columns = harmonics(grid, highest) * _curvature_weights(radius_m, highest)
     return columns @ _least_squares(harmonics(azimuth_rad, highest))
 

@@ -3,7 +3,7 @@
 Three figures answer the same question, for the limit of S grows with the square of the spacing: S
 with all points, S with a subset spaced as the text asks, and the curvature, which no spacing
 changes. Each figure estimates the true value: the bias of the largest reading of many, and of R2,
-is removed by levelling plausible settlements again (`tankcal.inspection.repeated_levelling`).
+is removed by extrapolation to errors of 0 (`tankcal.inspection.extrapolation`).
 """
 
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ import numpy as np
 
 from tankcal.gum.coverage import coverage_factor
 from tankcal.inspection.epochs import Epoch, differences, is_within_noise, warn_of_points
+from tankcal.inspection.extrapolation import Estimate, Statistic, estimate, simulate_errors
 from tankcal.inspection.figures import PROBABILITY, Figure
 from tankcal.inspection.out_of_plane import (
     Curvature,
@@ -20,12 +21,10 @@ from tankcal.inspection.out_of_plane import (
     between_neighbours,
     curvature_rows,
     explained_share,
-    explained_shares,
     fit_plane,
     largest_curvature_of,
     spaced_subset,
 )
-from tankcal.inspection.repeated_levelling import Estimate, estimate, repeat_levelling
 from tankcal.inspection.settlement_limits import largest_curvature
 from tankcal.messages import message
 from tankcal.record.inspection import Settlement, SettlementPoint
@@ -163,7 +162,16 @@ def assess(epoch, dof, strength, limits):
     highest = min(limits.highest_harmonic or len(z) // 4, (len(z) - 1) // 2)
     curvature = largest_curvature_of(azimuth, z, radius_m, highest)
     bends = curvature_rows(azimuth, radius_m, highest)
-    repeated = repeat_levelling(azimuth, z, epoch.u_m, dof) if dof else None
+    errors = simulate_errors(azimuth, z, epoch.u_m) if dof else None
+
+    def true_value(statistic, reading):
+        return None if errors is None else estimate(statistic, z, reading, errors)
+
+    def largest_of(neighbours, limits_m):
+        return _largest(neighbours, plane, variance, limits_m, true_value)
+
+    largest = largest_of(every, every_limit)
+    is_whole = len(subset.places) == len(every.places)  # the same points: not simulated twice
     return Assessed(
         epoch=epoch,
         dof=dof,
@@ -171,24 +179,18 @@ def assess(epoch, dof, strength, limits):
         plane=plane,
         r2=r2,
         u_r2=_u(gradient, variance),
-        true_r2=_estimate(
-            lambda many: explained_shares(many, plane.residual_operator), r2, repeated, most=1.0
-        ),
+        true_r2=true_value(_share_statistic(plane), r2),
         all_points=every,
         subset=subset,
         S_m=S,
         u_S_m=u_S,
-        largest=_largest(every, plane, variance, every_limit, repeated),
-        largest_of_subset=_largest(subset, plane, variance, subset_limit, repeated),
-        largest_by_arc=None
-        if by_arc is None
-        else _largest(every, plane, variance, by_arc, repeated),
+        largest=largest,
+        largest_of_subset=largest if is_whole else largest_of(subset, subset_limit),
+        largest_by_arc=None if by_arc is None else largest_of(every, by_arc),
         limits_m=every_limit,
         curvature=curvature,
         u_curvature_per_m=_u(curvature.gradient, variance),
-        true_curvature=_estimate(
-            lambda many: np.max(np.abs(many @ bends.T), axis=1), curvature.per_m, repeated
-        ),
+        true_curvature=true_value(Statistic(bends, _largest_size), curvature.per_m),
         curvature_limit_per_m=most,
     )
 
@@ -203,11 +205,24 @@ def _u(gradient, variance):
     return float(np.sqrt(gradient**2 @ variance))
 
 
-def _estimate(statistic, reading, repeated, **bounds):
-    return None if repeated is None else estimate(statistic, reading, repeated, **bounds)
+def _largest_size(values):
+    """(...) largest |value| of the last axis of (..., m)."""
+    return np.max(np.abs(values), axis=-1)
 
 
-def _largest(neighbours, plane, variance, limits_m, repeated):
+def _share_statistic(plane):
+    """`Statistic` of R2: the operator holds what is out of the plane, then what is out of level."""
+    count = len(plane.residual_m)
+    level = np.eye(count) - 1 / count
+
+    def share(values):
+        left, scatter = (np.sum(one**2, axis=-1) for one in np.split(values, 2, axis=-1))
+        return np.where(scatter > 0, 1 - left / np.where(scatter > 0, scatter, 1.0), 1.0)
+
+    return Statistic(np.concatenate([plane.residual_operator, level]), share, most=1.0)
+
+
+def _largest(neighbours, plane, variance, limits_m, true_value):
     S, u = _out_of_plane(neighbours, plane, variance)
     limits = np.ones(len(S)) if limits_m is None else limits_m
     at = int(np.argmax(np.abs(S) / limits))
@@ -218,9 +233,7 @@ def _largest(neighbours, plane, variance, limits_m, repeated):
         S_m=float(S[at]),
         u_m=float(u[at]),
         limit_m=None if limits_m is None else float(limits_m[at]),
-        true=_estimate(
-            lambda many: np.max(np.abs(many @ rows.T), axis=1), float(abs(S[at])), repeated
-        ),
+        true=true_value(Statistic(rows, _largest_size), float(abs(S[at]))),
     )
 
 
@@ -267,7 +280,7 @@ def _figure(assessed, *, reading, u, true, **given):
         found = {"value": reading, "U": None, "k": None}
     else:
         value = float(np.copysign(true.value, reading))
-        found = {"value": value, "U": true.U, "k": true.k,
+        found = {"value": value, "U": assessed.k * true.u, "k": assessed.k,
                  "reading": reading, "U_reading": assessed.k * u}  # fmt: skip
     return Figure(
         **found,

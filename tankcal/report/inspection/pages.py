@@ -14,7 +14,6 @@ SHORT = 12  # rows of a table that page.typ keeps on one page
 
 # Verdicts, the gravest first.
 ORDER = ("failed", "guard_band_beyond", "guard_band", "not_determined", "no_limit", "passed")
-MOST_FACTORS = 3  # coverage factors that are listed one by one; else their range
 
 
 def pages(paper, folder=None):
@@ -171,10 +170,7 @@ def _where(places):
 def _decision(paper):
     """The decision rule of this file, and its coverage factors."""
     factors = sorted({round(one["k"], 2) for one in paper.found["checks"] if one["k"]})
-    said = [paper.number(one, decimals=2) for one in factors]
-    k = "; ".join(said)
-    if len(said) > MOST_FACTORS:
-        k = paper.word("texts.factors", least=said[0], most=said[-1])
+    k = "; ".join(paper.number(one, decimals=2) for one in factors)
     decision = paper.found["decision"]
     rule = "" if decision == "guarded" else f"_{decision}"
     return paper.word(f"texts.decision{'' if k else '_without_k'}{rule}", k=k)
