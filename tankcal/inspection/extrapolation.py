@@ -23,7 +23,7 @@ import numpy as np
 from tankcal.inspection.out_of_plane import fit_plane
 
 VALUE_DRAWS = 4000  # of the estimate: its simulation error is about 0.03 of the sd of S
-U_DRAWS = 600  # levellings for u, at least 4 for each point
+U_DRAWS = 300  # levellings for u, at least 4 for each point
 INNER_DRAWS = 100  # of the estimate from each of them
 CHUNK = 4_000_000  # values that are computed together, to bound the memory
 SEED = 653

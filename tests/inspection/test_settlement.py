@@ -128,12 +128,14 @@ def test_readings_of_a_dense_levelling_are_beyond_the_limit(figure):
         beyond[count] = dict.fromkeys(
             ("settlement_all", "settlement_subset", "settlement_curvature"), 0
         )
-        for _ in range(100):
+        for number in range(100):
             z = waves(azimuth, PLANTED) + rng.normal(0, 1.5, count)
-            found = figures(epoch_of(z, s_mm=1.5), WIDE)
+            readings = figures(epoch_of(z, s_mm=1.5), WIDE, dof=0)
             for code in beyond[count]:
-                beyond[count][code] += abs(found[code].reading) > found[code].limit.value
-                failed += judged(found[code]).verdict == "failed"
+                beyond[count][code] += abs(readings[code].value) > readings[code].limit.value
+            if number < 10:
+                found = figures(epoch_of(z, s_mm=1.5), WIDE)
+                failed += sum(judged(found[code]).verdict == "failed" for code in beyond[count])
     figure(
         "settlement of half the limit, s = 1.5 mm, D 60 m: readings beyond it in % by all, subset,"
         " curvature",
@@ -143,7 +145,7 @@ def test_readings_of_a_dense_levelling_are_beyond_the_limit(figure):
     assert beyond[64]["settlement_all"] >= 90
     assert beyond[64]["settlement_subset"] == 0
     assert beyond[64]["settlement_curvature"] <= 5
-    assert failed <= 2
+    assert failed == 0
 
 
 def test_without_errors_every_spacing_says_the_same():
