@@ -319,7 +319,7 @@ def largest_curvature_of(azimuth_rad, z_m, radius_m, highest):
     return Curvature(highest, float(size(at)[0]), float(at % (2 * np.pi)), sign * rows @ operator)
 
 
-def curvature_rows(azimuth_rad, radius_m, highest):
+def curvature_rows(azimuth_rad, radius_m, highest, start_rad):
     """Curvature of the harmonics of U on an even grid of azimuths, as a linear map of elevations.
 
     Parameters
@@ -328,14 +328,16 @@ def curvature_rows(azimuth_rad, radius_m, highest):
     radius_m : float
     highest : int
         As of `largest_curvature_of`.
+    start_rad : float
+        A place of the grid, such as that of the largest curvature.
 
     Returns
     -------
     ndarray, shape (m, n)
-        Curvature, 1/m, is rows @ z; the grid misses at most 3.4 % of the largest.
+        Curvature, 1/m, is rows @ z; the grid misses at most 3.4 % of another maximum.
     """
     count = _COARSE_STEPS * highest
-    grid = np.arange(count) * 2 * np.pi / count
+    grid = start_rad + np.arange(count) * 2 * np.pi / count
     columns = harmonics(grid, highest) * _curvature_weights(radius_m, highest)
     return columns @ _least_squares(harmonics(azimuth_rad, highest))
 

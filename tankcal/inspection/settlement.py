@@ -161,7 +161,7 @@ def assess(epoch, dof, strength, limits):
     by_arc = None if limits.de_beer is None else every.arc_m / limits.de_beer
     highest = min(limits.highest_harmonic or len(z) // 4, (len(z) - 1) // 2)
     curvature = largest_curvature_of(azimuth, z, radius_m, highest)
-    bends = curvature_rows(azimuth, radius_m, highest)
+    bends = curvature_rows(azimuth, radius_m, highest, curvature.azimuth_rad)
     errors = simulate_errors(azimuth, z, epoch.u_m) if dof else None
 
     def true_value(statistic, reading):
