@@ -19,6 +19,7 @@ from tankcal.inspection.bulges import beside_a_bulge, find_bulge
 from tankcal.inspection.figures import PROBABILITY, Figure
 from tankcal.inspection.levelling import LEAST_READINGS
 from tankcal.inspection.settlement_limits import largest_drop_mm
+from tankcal.inspection.verdict import gravity
 from tankcal.messages import message
 from tankcal.record.inspection import EdgeProfile, InspectionLimit
 
@@ -252,10 +253,7 @@ def _edge_figure(lines, profiles, breaks, edge):
     if not with_break:
         return Figure(value=None, U=None, k=None, dof=0.0, limit=None, remark="no_break", **place)
     limited = [i for i in with_break if profiles[i].limit_mm is not None]
-    if limited:
-        worst = max(limited, key=lambda i: abs(profiles[i].drop_mm) / profiles[i].limit_mm)
-    else:
-        worst = max(with_break, key=lambda i: abs(profiles[i].drop_mm))
+    worst = max(limited or with_break, key=lambda i: _gravity(profiles[i]))
     one, found = profiles[worst], breaks[worst]
     limit = None
     if one.limit_mm is not None:
@@ -277,6 +275,10 @@ def _edge_figure(lines, profiles, breaks, edge):
     )
 
 
+def _gravity(profile):
+    return gravity(profile.drop_mm, profile.U_mm, profile.limit_mm)
+
+
 def _bulge_figure(lines, breaks, bulge):
     """Figure of the largest bulge or dent inside of the break-over points; None: there is none."""
     ratio = bulge.height_per_radius_mm_m
@@ -289,10 +291,9 @@ def _bulge_figure(lines, breaks, bulge):
             found.append((line, one))
     if not found:
         return None
-    line, one = max(
-        found, key=lambda two: abs(two[1].height_m) / (two[1].half_length_m if ratio else 1.0)
-    )
-    k = float(coverage_factor(PROBABILITY, np.inf)) if np.isfinite(one.u_m) else None
+    normal = float(coverage_factor(PROBABILITY, np.inf))
+    line, one = max(found, key=lambda two: _gravity_of_bulge(two[1], normal, ratio))
+    k = normal if np.isfinite(one.u_m) else None
     limit = None
     if ratio is not None:
         value = ratio * one.half_length_m
@@ -310,3 +311,10 @@ def _bulge_figure(lines, breaks, bulge):
         remark="bulge_place",
         remark_values={"radius_m": one.radius_m, "half_length_m": one.half_length_m},
     )
+
+
+def _gravity_of_bulge(bulge, k, ratio):
+    """`gravity` of a bulge in mm; ratio  limit of its height, mm per metre of its half length."""
+    limit = None if ratio is None else ratio * bulge.half_length_m
+    U = 1000 * k * bulge.u_m if np.isfinite(bulge.u_m) else None
+    return gravity(1000 * bulge.height_m, U, limit)

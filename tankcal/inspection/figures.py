@@ -33,6 +33,9 @@ class Figure:
         Where, and of which epoch or difference of two.
     used : int
         Places that the largest was taken from.
+    reading, U_reading : float or None
+        Largest single reading and its expanded uncertainty, where the value is an estimate of the
+        largest true value; None: the value is a reading itself.
     remark, remark_values
         Code of what is to be read beside it, and its numbers.
     """
@@ -50,5 +53,7 @@ class Figure:
     azimuth_deg: float | None = None
     epoch: str | None = None
     used: int = 0
+    reading: float | None = None
+    U_reading: float | None = None
     remark: str | None = None
     remark_values: dict = field(default_factory=dict)

@@ -19,6 +19,7 @@ from tankcal.geometry.form import harmonics
 
 LEVEL_M = 1e-9  # points that differ by less are level: what is left is rounding
 NEARLY = 1.25  # times as many points as a subset needs: none is left out
+_COARSE_STEPS = 12  # of simulated curvatures, along the shortest wave
 _STEPS = 32  # of the search for the largest curvature, along the shortest wave
 
 
@@ -298,8 +299,7 @@ def largest_curvature_of(azimuth_rad, z_m, radius_m, highest):
     """
     operator = _least_squares(harmonics(azimuth_rad, highest))
     unknowns = operator @ z_m
-    squares = np.repeat(np.arange(1, highest + 1), 2) ** 2.0
-    weights = np.concatenate([[0.0, 0.0, 0.0], squares[2:]]) / radius_m**2
+    weights = _curvature_weights(radius_m, highest)
 
     def size(t):
         return np.abs(harmonics(np.atleast_1d(t), highest) @ (weights * unknowns))
@@ -317,3 +317,32 @@ def largest_curvature_of(azimuth_rad, z_m, radius_m, highest):
     rows = harmonics([at], highest)[0] * weights
     sign = -1.0 if rows @ unknowns < 0 else 1.0
     return Curvature(highest, float(size(at)[0]), float(at % (2 * np.pi)), sign * rows @ operator)
+
+
+def curvature_rows(azimuth_rad, radius_m, highest, start_rad):
+    """Curvature of the harmonics of U on an even grid of azimuths, as a linear map of elevations.
+
+    Parameters
+    ----------
+    azimuth_rad : ndarray, shape (n,)
+    radius_m : float
+    highest : int
+        As of `largest_curvature_of`.
+    start_rad : float
+        A place of the grid, such as that of the largest curvature.
+
+    Returns
+    -------
+    ndarray, shape (m, n)
+        Curvature, 1/m, is rows @ z; the grid misses at most 3.4 % of another maximum.
+    """
+    count = _COARSE_STEPS * highest
+    grid = start_rad + np.arange(count) * 2 * np.pi / count
+    columns = harmonics(grid, highest) * _curvature_weights(radius_m, highest)
+    return columns @ _least_squares(harmonics(azimuth_rad, highest))
+
+
+def _curvature_weights(radius_m, highest):
+    """(2 highest + 1,) k^2 / R^2 of each harmonic, 0 of the plane."""
+    squares = np.repeat(np.arange(1, highest + 1), 2) ** 2.0
+    return np.concatenate([[0.0, 0.0, 0.0], squares[2:]]) / radius_m**2

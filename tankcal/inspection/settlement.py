@@ -2,7 +2,8 @@
 
 Three figures answer the same question, for the limit of S grows with the square of the spacing: S
 with all points, S with a subset spaced as the text asks, and the curvature, which no spacing
-changes.
+changes. Each figure estimates the true value: the bias of the largest reading of many, and of R2,
+is removed by extrapolation to errors of 0 (`tankcal.inspection.extrapolation`).
 """
 
 from dataclasses import dataclass
@@ -11,12 +12,14 @@ import numpy as np
 
 from tankcal.gum.coverage import coverage_factor
 from tankcal.inspection.epochs import Epoch, differences, is_within_noise, warn_of_points
+from tankcal.inspection.extrapolation import Estimate, Statistic, estimate, simulate_errors
 from tankcal.inspection.figures import PROBABILITY, Figure
 from tankcal.inspection.out_of_plane import (
     Curvature,
     Neighbours,
     Plane,
     between_neighbours,
+    curvature_rows,
     explained_share,
     fit_plane,
     largest_curvature_of,
@@ -38,14 +41,17 @@ class Largest:
     place : int
         Of the point, among all.
     S_m, u_m : float
-        With its sign; standard uncertainty, nan: not known.
+        Reading with its sign; standard uncertainty, nan: not known.
     limit_m : float or None
+    true : Estimate or None
+        Of the largest true |S|, at the limit of this place, m; None: no u is known.
     """
 
     place: int
     S_m: float
     u_m: float
     limit_m: float | None
+    true: Estimate | None
 
 
 @dataclass(frozen=True)
@@ -59,6 +65,7 @@ class Assessed:
         Of all uncertainties; 0 and nan: none is known.
     plane : Plane
     r2, u_r2 : float
+    true_r2 : Estimate or None
     all_points, subset : Neighbours
     S_m, u_S_m : ndarray, shape (n,)
         Of all points.
@@ -68,6 +75,7 @@ class Assessed:
         Of S of all points.
     curvature : Curvature
     u_curvature_per_m : float
+    true_curvature : Estimate or None
     curvature_limit_per_m : float or None
     """
 
@@ -77,6 +85,7 @@ class Assessed:
     plane: Plane
     r2: float
     u_r2: float
+    true_r2: Estimate | None
     all_points: Neighbours
     subset: Neighbours
     S_m: np.ndarray
@@ -87,6 +96,7 @@ class Assessed:
     limits_m: np.ndarray | None
     curvature: Curvature
     u_curvature_per_m: float
+    true_curvature: Estimate | None
     curvature_limit_per_m: float | None
 
     @property
@@ -151,6 +161,17 @@ def assess(epoch, dof, strength, limits):
     by_arc = None if limits.de_beer is None else every.arc_m / limits.de_beer
     highest = min(limits.highest_harmonic or len(z) // 4, (len(z) - 1) // 2)
     curvature = largest_curvature_of(azimuth, z, radius_m, highest)
+    bends = curvature_rows(azimuth, radius_m, highest, curvature.azimuth_rad)
+    errors = simulate_errors(azimuth, z, epoch.u_m) if dof else None
+
+    def true_value(statistic, reading):
+        return None if errors is None else estimate(statistic, z, reading, errors)
+
+    def largest_of(neighbours, limits_m):
+        return _largest(neighbours, plane, variance, limits_m, true_value)
+
+    largest = largest_of(every, every_limit)
+    is_whole = len(subset.places) == len(every.places)  # the same points: not simulated twice
     return Assessed(
         epoch=epoch,
         dof=dof,
@@ -158,16 +179,18 @@ def assess(epoch, dof, strength, limits):
         plane=plane,
         r2=r2,
         u_r2=_u(gradient, variance),
+        true_r2=true_value(_share_statistic(plane), r2),
         all_points=every,
         subset=subset,
         S_m=S,
         u_S_m=u_S,
-        largest=_largest(every, S, u_S, every_limit),
-        largest_of_subset=_largest(subset, *_out_of_plane(subset, plane, variance), subset_limit),
-        largest_by_arc=None if by_arc is None else _largest(every, S, u_S, by_arc),
+        largest=largest,
+        largest_of_subset=largest if is_whole else largest_of(subset, subset_limit),
+        largest_by_arc=None if by_arc is None else largest_of(every, by_arc),
         limits_m=every_limit,
         curvature=curvature,
         u_curvature_per_m=_u(curvature.gradient, variance),
+        true_curvature=true_value(Statistic(bends, _largest_size), curvature.per_m),
         curvature_limit_per_m=most,
     )
 
@@ -182,11 +205,36 @@ def _u(gradient, variance):
     return float(np.sqrt(gradient**2 @ variance))
 
 
-def _largest(neighbours, S, u, limits_m):
-    size = np.abs(S) if limits_m is None else np.abs(S) / limits_m
-    at = int(np.argmax(size))
-    limit = None if limits_m is None else float(limits_m[at])
-    return Largest(int(neighbours.places[at]), float(S[at]), float(u[at]), limit)
+def _largest_size(values):
+    """(...) largest |value| of the last axis of (..., m)."""
+    return np.max(np.abs(values), axis=-1)
+
+
+def _share_statistic(plane):
+    """`Statistic` of R2: the operator holds what is out of the plane, then what is out of level."""
+    count = len(plane.residual_m)
+    level = np.eye(count) - 1 / count
+
+    def share(values):
+        left, scatter = (np.sum(one**2, axis=-1) for one in np.split(values, 2, axis=-1))
+        return np.where(scatter > 0, 1 - left / np.where(scatter > 0, scatter, 1.0), 1.0)
+
+    return Statistic(np.concatenate([plane.residual_operator, level]), share, most=1.0)
+
+
+def _largest(neighbours, plane, variance, limits_m, true_value):
+    S, u = _out_of_plane(neighbours, plane, variance)
+    limits = np.ones(len(S)) if limits_m is None else limits_m
+    at = int(np.argmax(np.abs(S) / limits))
+    # Compare the points by their shares of the limits, and return to m at the limit of this place.
+    rows = (neighbours.operator @ plane.residual_operator) * (limits[at] / limits)[:, None]
+    return Largest(
+        place=int(neighbours.places[at]),
+        S_m=float(S[at]),
+        u_m=float(u[at]),
+        limit_m=None if limits_m is None else float(limits_m[at]),
+        true=true_value(Statistic(rows, _largest_size), float(abs(S[at]))),
+    )
 
 
 # ---- what is judged, and what is saved
@@ -209,8 +257,9 @@ def figures_of(assessed, limits):
             assessed,
             code="settlement_curvature",
             unit="1/m",
-            value=curvature.per_m,
+            reading=curvature.per_m,
             u=assessed.u_curvature_per_m,
+            true=assessed.true_curvature,
             limit=limits.limit("settlement_curvature", assessed.curvature_limit_per_m),
             azimuth_deg=float(np.degrees(curvature.azimuth_rad)),
             used=len(every.places),
@@ -225,11 +274,16 @@ def figures_of(assessed, limits):
     return found
 
 
-def _figure(assessed, *, u, **given):
-    is_known = bool(np.isfinite(u))
+def _figure(assessed, *, reading, u, true, **given):
+    """`Figure` of a reading and of the estimate of its true value; without a u the reading."""
+    if true is None:
+        found = {"value": reading, "U": None, "k": None}
+    else:
+        value = float(np.copysign(true.value, reading))
+        found = {"value": value, "U": assessed.k * true.u, "k": assessed.k,
+                 "reading": reading, "U_reading": assessed.k * u}  # fmt: skip
     return Figure(
-        U=assessed.k * u if is_known else None,
-        k=assessed.k if is_known else None,
+        **found,
         dof=assessed.dof,
         epoch=assessed.label,
         **given,
@@ -241,8 +295,9 @@ def _S_figure(code, assessed, largest, limit, used):
         assessed,
         code=code,
         unit="mm",
-        value=1000 * largest.S_m,
+        reading=1000 * largest.S_m,
         u=1000 * largest.u_m,
+        true=None if largest.true is None else largest.true.times(1000),
         limit=limit,
         azimuth_deg=float(np.degrees(assessed.epoch.azimuth_rad[largest.place])),
         used=used,
@@ -257,8 +312,9 @@ def _r2_figure(assessed, limits):
         assessed,
         code="settlement_cosine",
         unit="",
-        value=None if noise else assessed.r2,
-        u=np.nan if noise else assessed.u_r2,
+        reading=None if noise else assessed.r2,
+        u=assessed.u_r2,
+        true=None if noise else assessed.true_r2,
         limit=limits.limit("settlement_cosine", limits.least_r2),
         at_least=True,
         used=len(assessed.epoch.points),

@@ -1,7 +1,6 @@
 """Plumb and roundness of a wall, out of the shape that a record keeps of it.
 
-What decides a check is the place with the largest |value| where that is beyond the limit, else the
-one where |value| + U is largest: a tank passes only where every place does.
+The gravest place decides a check (`verdict.gravity`): a tank passes only where every place does.
 """
 
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ import numpy as np
 
 from tankcal.inspection.figures import PROBABILITY, Figure
 from tankcal.inspection.rules import limit_of
+from tankcal.inspection.verdict import gravity
 from tankcal.record.inspection import Generatrices, InspectedLevel
 from tankcal.uncertainty import coverage_factor
 
@@ -80,10 +80,7 @@ def deciding_place(value, U, limit):
     >>> [deciding_place(values, U, one) for one in (6.0, 9.0, None)]
     [1, 2, 1]
     """
-    size = np.abs(value)
-    if limit is None or np.any(size > limit):
-        return int(np.argmax(size))
-    return int(np.argmax(size + U))
+    return max(range(len(value)), key=lambda i: gravity(value[i], U[i], limit))
 
 
 def inspect_shape(shape, sizes, rule):
@@ -176,16 +173,8 @@ def _courses(shape, sizes, rule):
     if not found:
         return _undetermined("plumbness_course", None, "one_level_a_course")
     used = sum(one.used for one in found)
-    worst = max(found, key=_closeness)
+    worst = max(found, key=lambda one: gravity(one.value, one.U, one.limit and one.limit.value))
     return Figure(**(vars(worst) | {"used": used}))
-
-
-def _closeness(figure):
-    """How near to its limit a figure is, one beyond it before all others."""
-    if figure.limit is None:
-        return (0, abs(figure.value))
-    size, limit = abs(figure.value), figure.limit.value
-    return (1, size / limit) if size > limit else (0, (size + figure.U) / limit)
 
 
 def _of_plumb(code, plumb, height_m, limit, course=None):

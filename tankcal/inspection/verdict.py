@@ -1,14 +1,17 @@
-"""The verdict on a figure of an inspection: guard band and probability of conformity.
+"""The verdict on a figure of an inspection: guard bands and probability of conformity.
 
 With the limit L of |value| and the expanded uncertainty U
 
-    passed       |value| + U <= L
-    guard_band   |value| <= L < |value| + U
-    failed       |value| > L
+    passed              |value| + U <= L
+    guard_band          |value| <= L < |value| + U          (conditional pass)
+    guard_band_beyond   |value| - U <= L < |value|          (conditional fail)
+    failed              L < |value| - U
 
-and of a limit that is to be reached (a share that a plane explains) the same downwards. A U of 95 %
-leaves 2.5 % on either side: of the tanks beyond a limit, wherever they lie, at most so many pass.
-Where no U is known nothing passes. Source: JCGM 106:2012 7.3, 8.3.2.
+A limit that must be reached (the share that a plane explains) is judged in the same way downwards.
+A U of 95 % leaves 2.5 % on either side: at most 2.5 % of the tanks beyond a limit pass, and at most
+2.5 % of the tanks within it fail. Without U no figure passes or fails. Where the value estimates
+the largest of many, the largest reading with its own U must also be within the limit to pass.
+Sources: ILAC-G8:09/2019 4.2.3, guard bands w = U; JCGM 106:2012 7.3, 8.3.2.
 """
 
 import math
@@ -17,7 +20,7 @@ from tankcal.record.inspection import InspectionCheck
 from tankcal.tank.rules import conformity_probability
 
 
-def verdict_of(value, U, limit, *, at_least=False):
+def verdict_of(value, U, limit, *, at_least=False, reading=None, U_reading=None):
     """Code of the verdict on a value.
 
     Parameters
@@ -28,28 +31,64 @@ def verdict_of(value, U, limit, *, at_least=False):
     limit : float or None
     at_least : bool
         Whether the value must reach the limit; else its size must stay within it.
+    reading, U_reading : float or None
+        Largest reading and its U, of a value that is an estimate; None: the value is a reading.
 
     Returns
     -------
     str
-        "passed", "guard_band", "failed", or "not_determined" where there is no value or no limit,
-        or no U of a value that keeps it.
+        "passed", "guard_band", "guard_band_beyond", "failed", or "not_determined" where there is no
+        value or no limit, or no U of a value within its limit.
 
     Examples
     --------
-    >>> [verdict_of(value, 2.40, 6.28) for value in (3.5, 4.81, -6.5)]
-    ['passed', 'guard_band', 'failed']
+    >>> [verdict_of(value, 2.40, 6.28) for value in (3.5, 4.81, -6.5, -8.7)]
+    ['passed', 'guard_band', 'guard_band_beyond', 'failed']
     >>> verdict_of(4.81, None, 6.28), verdict_of(6.5, None, 6.28)
-    ('not_determined', 'failed')
+    ('not_determined', 'guard_band_beyond')
+    >>> verdict_of(3.5, 2.40, 6.28, reading=4.0, U_reading=2.40)
+    'guard_band'
     """
     if value is None or limit is None:
         return "not_determined"
-    room = value - limit if at_least else limit - abs(value)
-    if room < 0:
-        return "failed"
+    room = _room(value, limit, at_least)
     if U is None:
-        return "not_determined"
-    return "passed" if room >= U else "guard_band"
+        return "not_determined" if room >= 0 else "guard_band_beyond"
+    if room < 0:
+        return "guard_band_beyond" if room >= -U else "failed"
+    is_clear = reading is None or _room(reading, limit, at_least) >= U_reading
+    return "passed" if room >= U and is_clear else "guard_band"
+
+
+def _room(value, limit, at_least):
+    """Distance of a value from its limit, negative beyond it."""
+    return value - limit if at_least else limit - abs(value)
+
+
+def gravity(value, U, limit):
+    """Sort key of a place among many: the place with the largest key decides a check.
+
+    Places that fail come before those beyond the limit, and those before places within it, which
+    are ordered by |value| + U: a tank passes only where every place does.
+
+    Parameters
+    ----------
+    value : float
+    U, limit : float or None
+        None: not known, or no limit.
+
+    Examples
+    --------
+    >>> places = [(6.5, 1.0), (9.0, 4.0), (5.0, 1.2), (4.0, 2.5)]
+    >>> sorted(places, key=lambda one: gravity(*one, 5.2), reverse=True)
+    [(6.5, 1.0), (9.0, 4.0), (4.0, 2.5), (5.0, 1.2)]
+    """
+    size, U = abs(value), U or 0.0
+    if limit is None:
+        return 0, size
+    if size - U > limit:
+        return 2, (size - U) / limit
+    return (1, size / limit) if size > limit else (0, (size + U) / limit)
 
 
 def probability_of(value, u, limit, dof=math.inf, *, at_least=False):
@@ -95,7 +134,16 @@ def judged(figure):
         used=figure.used,
         limit=figure.limit,
         probability=probability_of(figure.value, u, limit, figure.dof, **at_least),
-        verdict=verdict_of(figure.value, figure.U, limit, **at_least),
+        verdict=verdict_of(
+            figure.value,
+            figure.U,
+            limit,
+            reading=figure.reading,
+            U_reading=figure.U_reading,
+            **at_least,
+        ),
+        reading=figure.reading,
+        U_reading=figure.U_reading,
         remark=figure.remark,
         remark_values=figure.remark_values,
     )

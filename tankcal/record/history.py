@@ -102,7 +102,7 @@ class CheckInHistory(Saved):
     value: float | None = key("with its sign; null: not determined")
     U: float | None = key("expanded; null: not known")
     limit: float | None = key("in that unit; null: none")
-    verdict: str = key('"passed", "guard_band", "failed" or "not_determined"')
+    verdict: str = key('"passed", "guard_band", "guard_band_beyond", "failed" or "not_determined"')
 
 
 class InspectionInHistory(Saved):

@@ -10,7 +10,15 @@ from tankcal.record.schema import Finite, Saved, key
 from tankcal.record.texts import WarningRecord
 from tankcal.version import find_version
 
-INSPECTION = SavedFormat("tankcal-inspection", 1, "inspection.json")  # so far one version
+
+def _from_1(found):
+    """Version 2 from version 1, whose figures are readings and fail as soon as they are beyond."""
+    checks = [one | {"reading": None, "U_reading": None} for one in found["checks"]]
+    return found | {"format": "tankcal-inspection/2", "decision": "simple_beyond", "checks": checks}
+
+
+INSPECTION = SavedFormat("tankcal-inspection", 2, "inspection.json", {1: _from_1})
+DECISIONS = ("guarded", "simple_beyond")
 
 CHECKS = (  # in the order of the papers
     "plumbness_axis", "plumbness_generatrix", "plumbness_course", "roundness_low",
@@ -18,7 +26,10 @@ CHECKS = (  # in the order of the papers
     "settlement_subset", "settlement_curvature", "settlement_de_beer", "edge_settlement",
     "bottom_bulge",
 )  # fmt: skip
-VERDICTS = ("failed", "guard_band", "not_determined", "passed")  # the gravest first
+VERDICTS = (  # the gravest first
+    "failed", "guard_band_beyond", "guard_band", "not_determined", "passed",
+)  # fmt: skip
+_VERDICT_KEY = ", ".join(f'"{one}"' for one in VERDICTS)
 
 
 class InspectedTank(Saved):
@@ -63,6 +74,11 @@ class InspectionCheck(Saved):
     code: str = key("such as plumbness_generatrix, see docs/inspection.md")
     unit: str = key('"mm", "mm/m", "1/m" or "" (a ratio)')
     value: float | None = key("the largest, with its sign; null: not determined")
+    reading: float | None = key(
+        "largest single reading, where the value is an estimate without the bias of the largest of "
+        "many; null: the value is a reading"
+    )
+    U_reading: float | None = key("expanded, of that reading; null: no such reading, or not known")
     U: float | None = key("expanded; null: not known")
     k: float | None = key("coverage factor of U")
     course: int | None = key("from the bottom, 1 first; null: of no single course")
@@ -72,7 +88,7 @@ class InspectionCheck(Saved):
     used: int = key("places that the largest was taken from")
     limit: InspectionLimit | None = key("null: the rule has none")
     probability: float | None = key("of conformity; null: no limit, or not determined")
-    verdict: str = key('"passed", "guard_band", "failed" or "not_determined"')
+    verdict: str = key(f"one of: {_VERDICT_KEY}")
     remark: str | None = key("code of what is to be read beside it; null: nothing")
     remark_values: dict = key("numbers and texts of the remark")
 
@@ -179,6 +195,11 @@ class InspectionFile(Saved, kw_only=True):
     notice: str = key("that stands on every page, such as EXAMPLE")
     tank: InspectedTank = key("what was inspected")
     rule: InspectionRule | None = key("null: figures without limits")
+    decision: str = key(
+        '"guarded": guard bands on both sides of a limit; "simple_beyond" (version 1): each value '
+        "beyond its limit has failed",
+        default=DECISIONS[0],
+    )
     as_built: bool = key("whether an earlier epoch takes out how the tank was built")
     checks: list[InspectionCheck] = key("in the order of docs/inspection.md")
     generatrices: Generatrices | None = key("null: the wall was not surveyed")

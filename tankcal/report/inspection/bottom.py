@@ -3,7 +3,7 @@
 from tankcal.report import blocks
 from tankcal.report.inspection import bottom_figures as figures
 from tankcal.report.inspection.paper import epoch_name
-from tankcal.report.inspection.tables import CHECKS, EDGES, POINTS
+from tankcal.report.inspection.tables import CHECKS, EDGES, POINTS, READING
 from tankcal.report.saved_paper import bearable
 from tankcal.report.tables import Column
 
@@ -24,8 +24,13 @@ def settlements(paper):
         paper.heading("settlement"),
         *([paper.figure(figures.epochs(paper), "epochs")] if more else []),
         paper.paragraph("settlement"),
+        *([paper.paragraph("estimates")] if _has_estimates(paper) else []),
         *(block for one in found for block in settlement(paper, one)),
     ]
+
+
+def _has_estimates(paper):
+    return any(one["reading"] is not None for one in paper.found["checks"])
 
 
 def settlement(paper, one):
@@ -85,8 +90,9 @@ def _verdicts(paper, one):
     if not own:
         return []
     columns = [c for c in CHECKS.on_paper() if c.key not in ("place", "probability")]
+    of_reading = [READING] if any(c["reading"] is not None for c in own) else []
     return [
-        paper.table("settlement_verdicts", own, [columns[0], USED, *columns[1:]],
+        paper.table("settlement_verdicts", own, [columns[0], USED, *of_reading, *columns[1:]],
                     epoch=name),
     ]  # fmt: skip
 

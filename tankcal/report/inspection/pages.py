@@ -13,7 +13,7 @@ SHOWN = ("table", "columns_table", "figure")
 SHORT = 12  # rows of a table that page.typ keeps on one page
 
 # Verdicts, the gravest first.
-ORDER = ("failed", "guard_band", "not_determined", "no_limit", "passed")
+ORDER = ("failed", "guard_band_beyond", "guard_band", "not_determined", "no_limit", "passed")
 
 
 def pages(paper, folder=None):
@@ -168,10 +168,12 @@ def _where(places):
 
 
 def _decision(paper):
-    """How a figure with its U is judged, and with which k."""
+    """The decision rule of this file, and its coverage factors."""
     factors = sorted({round(one["k"], 2) for one in paper.found["checks"] if one["k"]})
     k = "; ".join(paper.number(one, decimals=2) for one in factors)
-    return paper.word("texts.decision" if k else "texts.decision_without_k", k=k)
+    decision = paper.found["decision"]
+    rule = "" if decision == "guarded" else f"_{decision}"
+    return paper.word(f"texts.decision{'' if k else '_without_k'}{rule}", k=k)
 
 
 def limits(paper):

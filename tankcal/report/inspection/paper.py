@@ -106,6 +106,10 @@ class InspectionPaper(SavedPaper):
         text = self.in_unit(one, one["value"])
         return text if one["code"] in AT_LEAST else signed_text(one["value"], text)
 
+    def reading(self, one):
+        """The largest reading of a check whose figure is an estimate; None of others."""
+        return self.value(one | {"value": one["reading"]})
+
     def limit(self, one):
         """The limit of a check; marked where it was not read in the text of its standard."""
         bound = one["limit"]

@@ -42,6 +42,8 @@ CHECKS = Table(
     rows=lambda found: found["checks"],
 )
 
+READING = _said("reading", lambda paper, row: paper.reading(row), align="right")
+
 LIMITS = Table(
     "limits",
     (
@@ -63,6 +65,8 @@ SHEET_OF_CHECKS = Table(
         Column("value", decimals=_format, sheet=True, width=9),
         Column("U", decimals=_format, sheet=True, width=9),
         Column("k", decimals=2, sheet=True, width=5),
+        Column("reading", decimals=_format, sheet=True, width=9),
+        Column("U_reading", decimals=_format, sheet=True, width=9),
         Column("limit", decimals=_format, sheet=True, width=9),
         Column("unit", sheet=True, width=6),
         Column("verdict", sheet=True, width=16),
