@@ -7,6 +7,7 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError, TankcalError
 from tankcal.job.tables import Log
 from tankcal.messages import message
+from tankcal.recalibration.computed_rows import find_computed_rows
 from tankcal.recalibration.read_courses import read_courses
 from tankcal.recalibration.reading import read_former
 from tankcal.recalibration.recorded_radii import read_recorded
@@ -114,8 +115,33 @@ def read_table(
         _check_kind(former, kind, log)
         _check_bottom(former, bottom_m, log)
     log.stop_if_problems()
-    courses, warnings, seams_known = _fitting(former, courses)
-    return _read(former, courses, warnings, e_pa, bottom_m, seams_known)
+    computed = find_computed_rows(former)
+    if computed is not None:
+        read = _read_computed(former, computed, courses, e_pa, bottom_m)
+        if read is not None:
+            return read
+    return _read(former, former, courses, e_pa, bottom_m)
+
+
+def _read_computed(former, computed, courses, e_pa, bottom_m):
+    """TableRead of computed rows; None where each row may have been computed."""
+    try:
+        read = _read(former, computed.table(former), courses, e_pa, bottom_m)
+    except TankcalError:
+        if computed.is_certain:
+            raise
+        return None
+    if not computed.is_confirmed(former, read.geometry.state, sd_of_rows(former)):
+        return None
+    text = message(
+        "read_proportional_parts",
+        "the rows between multiples of {step:g} m are linear (proportional parts): only the rows "
+        "every {step:g} m are read ({count} of {rows})",
+        step=round(computed.step_m, 6),
+        count=len(computed.rows),
+        rows=len(former.height_m),
+    )
+    return replace(read, warnings=(text, *read.warnings))
 
 
 def _former(path, former_toml, log):
@@ -260,9 +286,11 @@ def _with_seams(former, courses):
     return replace(courses, heights_m=np.diff(edges))
 
 
-def _read(former, courses, warnings, e_pa, bottom_m, seams_known):
+def _read(former, chosen, courses, e_pa, bottom_m):
+    """TableRead of a FormerTable by the rows that are chosen of it, a FormerTable as well."""
+    courses, warnings, seams_known = _fitting(chosen, courses)
     found = read_upright(
-        former,
+        chosen,
         courses.heights_m,
         courses.thickness_m,
         modulus_pa=e_pa,
@@ -274,7 +302,7 @@ def _read(former, courses, warnings, e_pa, bottom_m, seams_known):
         former, found, courses.names, u_common_m=u_common, e_pa=e_pa, tank_id=_tank_of(former)
     )
     if seams_known:
-        warnings = (*warnings, *_other_seams(former, courses, found, e_pa, bottom_m))
+        warnings = (*warnings, *_other_seams(chosen, courses, found, e_pa, bottom_m))
     told = (*warnings, *_of_geometry(former, found, seams_known), *_of_job(former, u_common))
     return TableRead(former, found, courses.names, job, told)
 
