@@ -13,6 +13,7 @@ USUAL_TEMPERATURE_C = 20.0
 UNKNOWN_ZERO_M = 0.02
 LOWEST_THING_M = 2e-4  # height of a thing in deadwood.csv, whose dips have four decimals
 LEAST_RISE_M3 = 1e-6  # between rows of bottom.csv, whose volumes have six decimals
+LEVEL_M = 1e-5  # last digit of the dips in bottom.csv
 EMPTY_BELOW_M = 0.001  # of a first row without volume
 SURE = 3.0  # standard uncertainties, within which a bottom is flat and a zero is at the bottom
 
@@ -63,7 +64,7 @@ def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
         diameter=2 * float(found.radii_m[0]),
         height=float(np.sum(heights)),
         zero=zero,
-        density=max(round(density, 1), 0.0),
+        density=round(density, 1),
         source="table",
         u_common_m=u_common_m,
         e_pa=e_pa,
@@ -83,6 +84,8 @@ def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
         rows = [(name, *thing) for name, thing in zip(names_of_things, things, strict=True)]
         heading = ("name", "bottom_m", "top_m", "volume_m3", "u_m3")
         texts["deadwood.csv"] = "\n".join(map(",".join, [heading, *rows])) + "\n"
+    if found.state.bulges_m is not None:
+        texts["uncertainty.csv"] = _profiles(found.state.bulges_m)
     words = (note, *names_of_things)
     return JobOfTable(texts, found.covariance_m2, tuple(names), words)
 
@@ -233,6 +236,14 @@ def _csv(heading, rows, decimals):
     return "\n".join(lines) + "\n"
 
 
+def _profiles(bulges_m):
+    """uncertainty.csv of the profiles that the table shows: the job has straight courses."""
+    barrel = 1.5 * np.sqrt(np.mean(np.sum(bulges_m[:, 1::2] ** 2, axis=1)))
+    taper = np.sqrt(np.mean(np.sum(bulges_m[:, ::2] ** 2, axis=1)))
+    rows = [f"{name},{1000 * u:.3g},mm" for name, u in (("barrel", barrel), ("taper", taper))]
+    return "\n".join(["input,u,unit", *rows]) + "\n"
+
+
 def _deadwood(found, top_m):
     """Rows of deadwood.csv: bottom, top, volume, u of each thing within the rows that were used.
 
@@ -256,7 +267,7 @@ def _bottom(former, found):
     and the second is None. Else they are (rows, 2) dips and volumes up to that row.
     """
     base, lowest, zero, state = found.base_m3, found.lowest_m, found.zero_m, found.state
-    shell = state.rings.volume_m3(np.array([lowest]), state.radii_m, state.density_kg_m3)[0]
+    shell = state.shell_m3(np.array([lowest]))[0]
     area = np.pi * state.radii_m[0] ** 2
     level = zero.value + (shell - base.value) / area
     below = former.height_m < lowest - 1e-9
@@ -267,8 +278,8 @@ def _bottom(former, found):
     if is_near and np.all(np.abs(volumes - flat) < SURE * found.expected_m3):
         return level, None
     rows = _rising([*zip(dips, volumes, strict=True), (lowest, max(base.value, 0.0))])
-    floor = min(zero.value, 0.0)
-    if rows[0][0] > floor and rows[0][1] > 0 or len(rows) == 1:
+    floor = np.floor(min(zero.value, 0.0) / LEVEL_M) * LEVEL_M  # not above the shell when rounded
+    if (rows[0][0] > floor and rows[0][1] > 0) or len(rows) == 1:
         rows.insert(0, _row_below(rows, area, floor))
     return min(zero.value, lowest), np.array(rows)
 
