@@ -27,7 +27,9 @@ class ComputedRows:
     Attributes
     ----------
     rows : (n,) ndarray of int
-        Numbers of the computed rows; below the lowest linear step all rows.
+        Numbers of the computed rows, from the bottom up.
+    lowest : int
+        Number of the row above which the other rows are linear.
     step_m : float
         Between computed rows.
     is_certain : bool
@@ -35,6 +37,7 @@ class ComputedRows:
     """
 
     rows: np.ndarray
+    lowest: int
     step_m: float
     is_certain: bool
 
@@ -65,7 +68,8 @@ class ComputedRows:
         if self.is_certain:
             return True
         dips = former.height_m
-        between = (dips >= max(state.lowest_m, dips[self.rows[0]])) & (dips <= dips[self.rows[-1]])
+        lowest = max(state.lowest_m, dips[self.lowest])
+        between = (dips >= lowest) & (dips <= dips[self.rows[-1]])
         exact = state.volume_m3(dips)
         linear = np.interp(dips, dips[self.rows], exact[self.rows])
         chi2 = [
@@ -96,9 +100,9 @@ def find_computed_rows(former):
             continue
         first = _first_linear_row(volumes, parts)
         if first is not None:
-            rows = np.concatenate([np.arange(first), np.arange(first, count, parts)])
+            rows = np.arange(first % parts, count, parts)
             is_certain = _is_interpolated(volumes, first, parts)
-            found.append(ComputedRows(rows, long_step, is_certain))
+            found.append(ComputedRows(rows, first, long_step, is_certain))
     return max(found, key=lambda one: (one.is_certain, one.step_m), default=None)
 
 

@@ -39,6 +39,7 @@ SURE_OF_BULGED = 8.0  # standard uncertainties of a thing where courses bulge
 JOINT_M, DRAWN_IN_M = 0.15, 3e-3  # about a joint; of the radius
 LONGEST_BULGED_M = 1.2  # of a thing where courses bulge: a longer thing looks like their profile
 LOW_M, LOW_SHARE = 0.15, 0.2  # things lower than this take no more of the cut: that is the bottom
+TAKEN_SHARE, GIVEN_SHARE = 0.7, 0.1  # of the cut, that a thing takes or gives at most
 EDGE_M = 0.1  # below the first seam: where rows of the first ring end, the zero being unknown
 SAME_ZERO = 3.0  # standard deviations
 
@@ -412,9 +413,11 @@ def _cheaper(rows, found, fittings, about):
 
 def _is_possible(found):
     state = found.state
-    largest = LOW_SHARE * np.pi * state.radii_m[0] ** 2
+    cut = np.pi * state.radii_m[0] ** 2
+    largest = LOW_SHARE * cut
     return abs(state.zero_m) <= FARTHEST_M and all(
         one.bottom_m < one.top_m
+        and -TAKEN_SHARE * cut < one.volume_m3 / (one.top_m - one.bottom_m) < GIVEN_SHARE * cut
         and (
             one.bottom_m > state.lowest_m + LOW_M
             or abs(one.volume_m3) < largest * (one.top_m - one.bottom_m)
