@@ -68,10 +68,24 @@ def search(rows, state, lowest_m, usual_density):
         When the rows do not determine the radii.
     """
     edges = state.rings.edges_m
-    if show_bulges(rows.dip_m, rows.volume_m3, rows.sd_m3, edges):
+    shows_bulges = show_bulges(rows.dip_m, rows.volume_m3, rows.sd_m3, edges)
+    if shows_bulges:
         found = _search_bulged(rows, state, lowest_m, *usual_density)
         if found is not None:
             return found
+    found = _search_straight(rows, state, lowest_m)
+    if shows_bulges or _is_plain(found):
+        return found
+    # Many things, or things that end at joints: that is what a coarse table makes of bulges.
+    bulged = _search_bulged(rows, state, lowest_m, *usual_density)
+    is_simpler = bulged is not None and (
+        len(bulged.state.fittings) < len(found.state.fittings) and _cost(bulged) < _cost(found)
+    )
+    return bulged if is_simpler else found
+
+
+def _search_straight(rows, state, lowest_m):
+    """The Fit of straight courses; arguments as of `search`."""
     if lowest_m is not None:
         rows = rows.above(lowest_m)
         return _with_moved_seams(rows, _with_fittings(rows, state))

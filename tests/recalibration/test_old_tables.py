@@ -88,7 +88,7 @@ def test_proportional_parts_are_found_and_left_out(tmp_path):
     found = read(tmp_path, table)
     assert "read_proportional_parts" in codes(found)
     assert found.geometry.fittings == ()
-    assert len(found.geometry.used) == 66
+    assert len(found.geometry.used) == 67
     assert_radii(found)
 
 
@@ -99,7 +99,8 @@ def test_a_thing_in_a_tank_with_proportional_parts(tmp_path):
     (thing,) = found.geometry.fittings
     assert abs(thing.volume_m3.value + 0.16) < max(3 * thing.volume_m3.u, 1e-3)
     assert_radii(found)
-    assert_job_gives_the_table(tmp_path, found, with_proportional_parts(table, 10))
+    computed = replace(table, height_m=table.height_m[::10], volume_m3=table.volume_m3[::10])
+    assert_job_gives_the_table(tmp_path, found, computed)
 
 
 @pytest.mark.parametrize("seed", range(5))
