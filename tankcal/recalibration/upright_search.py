@@ -17,7 +17,7 @@ from tankcal.messages import message
 from tankcal.recalibration.bulges import no_bulges, show_bulges
 from tankcal.recalibration.fittings import find_fittings, in_other_pairs
 from tankcal.recalibration.rounding import ROUGH, roughness, rounded_again, scale_of_u
-from tankcal.recalibration.table_fit import tried
+from tankcal.recalibration.table_fit import DENSITY_SD_KG_M3, tried
 from tankcal.recalibration.zero import FARTHEST_M, find_zeros, move_seams
 
 SEAMS_FREE = "base", "density", "seams"
@@ -71,7 +71,7 @@ def search(rows, state, lowest_m, usual_density):
     shows_bulges = show_bulges(rows.dip_m, rows.volume_m3, rows.sd_m3, edges)
     if shows_bulges:
         found = _search_bulged(rows, state, lowest_m, *usual_density)
-        if found is not None:
+        if found is not None and not _is_straight(rows, found):
             return found
     found = _search_straight(rows, state, lowest_m)
     if shows_bulges or _is_plain(found):
@@ -133,6 +133,18 @@ def _search_bulged(rows, state, lowest_m, density, density_sd):
         best = again
     best = tried(rows.above(max(lowest, best.state.lowest_m)), _without_unsure(some, best).state)
     return best and _with_lower_rows(rows.above(lowest), best)
+
+
+def _is_straight(rows, found):
+    """Whether straight courses with the same things explain the rows as well as profiles do."""
+    state = replace(
+        found.state,
+        bulges_m=None,
+        usual_density_kg_m3=None,
+        density_sd_kg_m3=DENSITY_SD_KG_M3,
+    )
+    straight = tried(rows.above(found.state.lowest_m), state)
+    return straight is not None and straight.chi2 < found.cost + PRICE
 
 
 def _without_unsure(rows, found):
