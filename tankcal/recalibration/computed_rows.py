@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tankcal.recalibration.table_fit import Rows, tried
+
 USUAL_STEPS_M = (  # of computed rows; longer steps leave a course with too few of them
     0.2, 0.1524, 0.1, 0.0762, 0.0508, 0.05, 0.0254, 0.02, 0.0127, 0.01, 0.005
 )  # fmt: skip
@@ -70,13 +72,11 @@ class ComputedRows:
         dips = former.height_m
         lowest = max(state.lowest_m, dips[self.lowest])
         between = (dips >= lowest) & (dips <= dips[self.rows[-1]])
-        exact = state.volume_m3(dips)
-        linear = np.interp(dips, dips[self.rows], exact[self.rows])
-        chi2 = [
-            float(np.sum(((former.volume_m3 - one) / sd_m3)[between] ** 2))
-            for one in (exact, linear)
-        ]
-        return chi2[0] - chi2[1] > LEAST_GAIN
+        linear = np.interp(dips, dips[self.rows], state.volume_m3(dips)[self.rows])
+        by_parts = float(np.sum(((former.volume_m3 - linear) / sd_m3)[between] ** 2))
+        # The computed rows may place seams and zero badly: all rows place them again.
+        exact = tried(Rows(dips, former.volume_m3, sd_m3).of(between), state)
+        return exact is not None and exact.chi2 - by_parts > LEAST_GAIN
 
 
 def find_computed_rows(former):

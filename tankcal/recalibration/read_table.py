@@ -340,7 +340,8 @@ def _other_seams(former, courses, found, e_pa, bottom_m):
     declared = np.cumsum(found.heights_m)[:-1]
     doubtful = [one for one in found.fittings if _may_be_seams(one, declared + found.zero_m.value)]
     is_bulged = found.state.bulges_m is not None  # profiles take up what seams elsewhere show
-    if is_bulged or found.seams_are == "found" or not (doubtful or found.roughness > 1):
+    is_doubtful = is_bulged or doubtful or found.roughness > 1
+    if found.seams_are == "found" or not is_doubtful:
         return
     try:
         other = read_upright(
@@ -355,6 +356,8 @@ def _other_seams(former, courses, found, e_pa, bottom_m):
         return
     seams = np.cumsum(other.heights_m)[:-1]
     is_simpler = len(other.fittings) < len(found.fittings) or found.roughness > other.roughness
+    if is_bulged:
+        is_simpler = other.state.bulges_m is None
     is_as_good = other.rms_m3 <= AS_GOOD * max(found.rms_m3, found.expected_m3)
     if is_simpler and is_as_good and np.any(abs(seams - declared) > OTHER_PLACE_M):
         yield message(

@@ -115,6 +115,14 @@ def test_rows_that_were_all_computed_are_not_taken_for_interpolated(seed):
     assert parts.step_m == 0.1
 
 
+def test_rows_that_were_all_computed_are_all_read(tmp_path):
+    """Seams near rows of 2 dm: these rows alone would place the zero 4 mm off."""
+    heights, plates = np.array([1.9, 2.0, 1.8, 1.65]), np.array([0.010, 0.008, 0.006, 0.006])
+    exact = SimulatedTank(6.0 - plates, heights, plates, 0.0, zero_m=-0.02, cone_m=0.05)
+    found = read(tmp_path, table_of(exact), heights)
+    assert "read_proportional_parts" not in codes(found)
+
+
 @pytest.mark.parametrize("density", [860.6, 0.0])
 def test_a_declared_density_holds_where_courses_bulge(tmp_path, density):
     table = table_of(tank(density_kg_m3=density, bulge_m=0.004))
