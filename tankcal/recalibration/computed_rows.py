@@ -16,7 +16,8 @@ USUAL_STEPS_M = (  # of computed rows; longer steps leave a course with too few 
 )  # fmt: skip
 FEWEST_STEPS = 8  # of computed rows
 LEAST_PART = 0.75  # of the rows: above the bottom, which may have been computed row by row
-FEWEST_PARTS, FEWEST_UNEVEN = 5, 30  # parts and uneven steps that prove interpolation
+FEWEST_PARTS = 5  # rows of a step; in shorter steps exact rows look linear
+FEWEST_UNEVEN = 30  # uneven steps that prove interpolation
 INTERPOLATED, LINEAR = 0.5, 1.0  # last digits, farthest from a chord: of printed, of exact volumes
 ROUNDING = 1e-6
 LEAST_GAIN = 25.0  # of chi2, by interpolation
@@ -96,7 +97,7 @@ def find_computed_rows(former):
     found = []
     for long_step in USUAL_STEPS_M:
         parts = round(long_step / step)
-        if abs(parts * step - long_step) > ROUNDING or not 1 < parts <= count // FEWEST_STEPS:
+        if abs(parts * step - long_step) > ROUNDING or not FEWEST_PARTS <= parts <= count // FEWEST_STEPS:
             continue
         first = _first_linear_row(volumes, parts)
         if first is not None:
@@ -142,8 +143,6 @@ def _is_interpolated(volumes, first, parts):
 
     Volumes that were computed at each row are up to a whole digit off where steps are uneven.
     """
-    if parts < FEWEST_PARTS:
-        return False
     steps = (len(volumes) - 1 - first) // parts
     rises = np.diff(volumes[first : first + steps * parts + 1]).reshape(steps, parts)
     uneven = np.count_nonzero(np.ptp(rises, axis=1) > 0.5)
