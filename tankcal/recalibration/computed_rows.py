@@ -97,7 +97,8 @@ def find_computed_rows(former):
     found = []
     for long_step in USUAL_STEPS_M:
         parts = round(long_step / step)
-        if abs(parts * step - long_step) > ROUNDING or not FEWEST_PARTS <= parts <= count // FEWEST_STEPS:
+        is_multiple = abs(parts * step - long_step) < ROUNDING
+        if not is_multiple or not FEWEST_PARTS <= parts <= count // FEWEST_STEPS:
             continue
         first = _first_linear_row(volumes, parts)
         if first is not None:

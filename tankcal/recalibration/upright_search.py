@@ -74,7 +74,7 @@ def search(rows, state, lowest_m, usual_density):
         if found is not None and not _is_straight(rows, found):
             return found
     found = _search_straight(rows, state, lowest_m)
-    if shows_bulges or _is_plain(found):
+    if shows_bulges or _is_plain(found) or _is_by_rounding(found):
         return found
     # Many things, or things that end at joints: that is what a coarse table makes of bulges.
     bulged = _search_bulged(rows, state, lowest_m, *usual_density)
