@@ -4,7 +4,7 @@ The head is integrated numerically for each dip: at every node of every ring the
 looked up, squared, and summed. A dished bottom and things in the tank are summed in the same way.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,7 @@ class SimulatedTank:
     zero_m: float = 0.0
     deadwood: tuple = ()  # (bottom, top, volume), dips; negative volumes reduce
     cone_m: float = 0.0  # rise of the bottom towards its centre
+    bulge_m: float = 0.0  # middle of each course against its joints: a parabola of mean radius_m
 
     @property
     def top_m(self):
@@ -42,7 +43,8 @@ class SimulatedTank:
             if end > bottom:
                 z = bottom + (end - bottom) * (1 + NODES) / 2
                 hoop_stress = self.density_kg_m3 * GRAVITY * (dip - z) * r / plate
-                loaded = r * (1 + hoop_stress / STEEL)
+                parabola = 1 / 3 - (2 * (z - bottom) / height - 1) ** 2
+                loaded = r * (1 + hoop_stress / STEEL) + self.bulge_m * parabola
                 total += np.pi * (WEIGHTS @ loaded**2) * (end - bottom) / 2
             bottom += height
         for low, high, volume in self.deadwood:
@@ -66,6 +68,15 @@ def table_of(tank, step_m=0.01, quantum_m3=0.001, first_m=0.0, last_m=None, **de
         n for n in range(9) if abs(step_m * 10**n - round(step_m * 10**n)) < 1e-9
     )
     return FormerTable("old.csv", dips, volumes, quantum, quantum_m3, **declared)
+
+
+def with_proportional_parts(table, parts):
+    """The table with the rows between each `parts`-th row interpolated, and rounded again."""
+    computed = np.arange(0, len(table.height_m), parts)
+    dips = table.height_m[: computed[-1] + 1]
+    volumes = np.interp(dips, dips[computed], table.volume_m3[computed])
+    quantum = table.volume_quantum_m3
+    return replace(table, height_m=dips, volume_m3=np.round(volumes / quantum) * quantum)
 
 
 def draw_tank(random, *, density=None, shift=True, deadwood=True, bottom=True):

@@ -7,14 +7,21 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError, TankcalError
 from tankcal.job.tables import Log
 from tankcal.messages import message
+from tankcal.recalibration.bulges import largest_bulge_m
+from tankcal.recalibration.computed_rows import find_computed_rows
 from tankcal.recalibration.read_courses import read_courses
 from tankcal.recalibration.reading import read_former
 from tankcal.recalibration.recorded_radii import read_recorded
 from tankcal.recalibration.rounding import sd_of_rows
-from tankcal.recalibration.seams import find_seams
+from tankcal.recalibration.seams import find_seams, find_seams_within
 from tankcal.recalibration.solid_geometry import fit_lying, fit_sphere
 from tankcal.recalibration.table_job import job_of_geometry, job_of_record, job_of_solid
-from tankcal.recalibration.upright_geometry import STEEL_PA, read_upright
+from tankcal.recalibration.upright_geometry import (
+    DECLARED_SD_KG_M3,
+    STEEL_PA,
+    is_possible,
+    read_upright,
+)
 
 FEWEST_ROWS = 8
 SOLIDS = "horizontal", "sphere"
@@ -114,8 +121,55 @@ def read_table(
         _check_kind(former, kind, log)
         _check_bottom(former, bottom_m, log)
     log.stop_if_problems()
-    courses, warnings, seams_known = _fitting(former, courses)
-    return _read(former, courses, warnings, e_pa, bottom_m, seams_known)
+    _check_heights(former, courses)
+    computed = find_computed_rows(former)
+    if computed is not None:
+        read = _read_computed(former, computed, courses, e_pa, bottom_m)
+        if read is not None:
+            return read
+    return _read(former, former, courses, e_pa, bottom_m)
+
+
+def _check_heights(former, courses):
+    """Refuse courses that have several seams of the table in them."""
+    heights = courses.heights_m
+    if np.isnan(heights).any():
+        return
+    within = find_seams_within(former.height_m, former.volume_m3, sd_of_rows(former), heights)
+    problems = []
+    for number, seams in within.items():
+        expected = message(
+            "read_seams_within",
+            "course {name}: found {height:g} m, but the cross-section of the table changes at "
+            "{seams} m, within this course; expected the height of one course",
+            name=courses.names[number],
+            height=float(heights[number]),
+            seams=[f"{one:.2f}" for one in seams],
+        )
+        problems.append(Problem(courses.file, expected, number + 2, "height_m"))
+    if problems:
+        raise InputError(problems)
+
+
+def _read_computed(former, computed, courses, e_pa, bottom_m):
+    """TableRead of computed rows; None where each row may have been computed."""
+    try:
+        read = _read(former, computed.table(former), courses, e_pa, bottom_m)
+    except TankcalError:
+        if computed.is_certain:
+            raise
+        return None
+    if not computed.is_confirmed(former, read.geometry.state, sd_of_rows(former)):
+        return None
+    text = message(
+        "read_proportional_parts",
+        "the rows between multiples of {step:g} m are linear (proportional parts): only the rows "
+        "every {step:g} m are read ({count} of {rows})",
+        step=round(computed.step_m, 6),
+        count=len(computed.rows),
+        rows=len(former.height_m),
+    )
+    return replace(read, warnings=(text, *read.warnings))
 
 
 def _former(path, former_toml, log):
@@ -260,9 +314,11 @@ def _with_seams(former, courses):
     return replace(courses, heights_m=np.diff(edges))
 
 
-def _read(former, courses, warnings, e_pa, bottom_m, seams_known):
+def _read(former, chosen, courses, e_pa, bottom_m):
+    """TableRead of a FormerTable by the rows that are chosen of it, a FormerTable as well."""
+    courses, warnings, seams_known = _fitting(chosen, courses)
     found = read_upright(
-        former,
+        chosen,
         courses.heights_m,
         courses.thickness_m,
         modulus_pa=e_pa,
@@ -274,7 +330,7 @@ def _read(former, courses, warnings, e_pa, bottom_m, seams_known):
         former, found, courses.names, u_common_m=u_common, e_pa=e_pa, tank_id=_tank_of(former)
     )
     if seams_known:
-        warnings = (*warnings, *_other_seams(former, courses, found, e_pa, bottom_m))
+        warnings = (*warnings, *_other_seams(chosen, courses, found, e_pa, bottom_m))
     told = (*warnings, *_of_geometry(former, found, seams_known), *_of_job(former, u_common))
     return TableRead(former, found, courses.names, job, told)
 
@@ -283,7 +339,9 @@ def _other_seams(former, courses, found, e_pa, bottom_m):
     """What to say where seams elsewhere explain by fewer things what those declared leave over."""
     declared = np.cumsum(found.heights_m)[:-1]
     doubtful = [one for one in found.fittings if _may_be_seams(one, declared + found.zero_m.value)]
-    if found.seams_are == "found" or not (doubtful or found.roughness > 1):
+    is_bulged = found.state.bulges_m is not None  # profiles take up what seams elsewhere show
+    is_doubtful = is_bulged or doubtful or found.roughness > 1
+    if found.seams_are == "found" or not is_doubtful:
         return
     try:
         other = read_upright(
@@ -298,6 +356,8 @@ def _other_seams(former, courses, found, e_pa, bottom_m):
         return
     seams = np.cumsum(other.heights_m)[:-1]
     is_simpler = len(other.fittings) < len(found.fittings) or found.roughness > other.roughness
+    if is_bulged:
+        is_simpler = other.state.bulges_m is None
     is_as_good = other.rms_m3 <= AS_GOOD * max(found.rms_m3, found.expected_m3)
     if is_simpler and is_as_good and np.any(abs(seams - declared) > OTHER_PLACE_M):
         yield message(
@@ -343,17 +403,13 @@ def _of_geometry(former, found, seams_known):
             expected=1000 * found.expected_m3,
             factor=found.roughness,
         )
-    declared = former.liquid_density_kg_m3
-    density = found.density_kg_m3
-    value = 0.0 if found.head == "without" else density.value
-    if declared is not None and abs(declared - value) > 3 * density.u + 0.001 * declared:
+    yield from _of_density(former.liquid_density_kg_m3, found)
+    if found.state.bulges_m is not None:
         yield message(
-            "read_other_density",
-            "declared is a head of {declared:g} kg/m3; the table was made with {found:.0f}, u "
-            "{u:.2g} kg/m3",
-            declared=declared,
-            found=value,
-            u=density.u,
+            "read_bulges",
+            "the courses bulge, up to {largest:.2g} mm from their mean radius: profiles of the "
+            "courses are estimated, too, and less is known of head, zero and things in the tank",
+            largest=1000 * largest_bulge_m(found.state.bulges_m),
         )
     if found.seams_are == "found" and seams_known:
         yield message(
@@ -372,6 +428,43 @@ def _of_geometry(former, found, seams_known):
                 bottom=one.bottom_m.value,
                 top=one.top_m.value,
             )
+
+
+def _of_density(declared, found):
+    """What the density of the head is compared with: those of liquids, and the declared one."""
+    density = found.density_kg_m3
+    held = found.state.density_kg_m3
+    if not is_possible(density):
+        yield message(
+            "read_strange_density",
+            "the rows alone give a head of {found:.0f} kg/m3, u {u:.2g} kg/m3, that of no liquid: "
+            "check height_m and thickness_mm of courses.csv; the job has {held:.0f} kg/m3",
+            found=density.value,
+            u=density.u,
+            held=held,
+        )
+    value = 0.0 if found.head == "without" else density.value
+    if declared is None or abs(declared - value) <= 3 * density.u + 0.001 * declared:
+        return
+    if abs(held - declared) <= 3 * DECLARED_SD_KG_M3:
+        yield message(
+            "read_held_density",
+            "declared is a head of {declared:g} kg/m3; the rows alone give {found:.0f}, u {u:.2g} "
+            "kg/m3, but they have more in them than courses and head: the job has {held:.0f} kg/m3",
+            declared=declared,
+            found=value,
+            u=density.u,
+            held=held,
+        )
+        return
+    yield message(
+        "read_other_density",
+        "declared is a head of {declared:g} kg/m3; the table was made with {found:.0f}, u "
+        "{u:.2g} kg/m3",
+        declared=declared,
+        found=value,
+        u=density.u,
+    )
 
 
 def _of_job(former, u_common):

@@ -5,6 +5,12 @@ import numpy as np
 LEAST_APART_M = 0.8  # of two seams, and of a seam from the ends of the table
 PLACES_APART_M = 0.01
 LEAST_GAIN = 30.0  # of chi2 by a seam
+MOST_ROWS = 300  # that heights of courses are checked by
+ABOVE_BOTTOM_M = 0.4  # of rows that heights of courses are checked by
+FROM_ENDS_M = 0.3  # of a course, that a seam within it is away
+WIDEST_PLATE_M, TALL = 3.1, 1.4  # of a course; over the median: only taller courses are checked
+CLEAR_RATIO = 30.0  # of chi2, between the seams that are declared and those that the table shows
+OPPOSITE = 0.25  # of the larger of two jumps of the area: a thing in the tank begins and ends there
 
 
 def find_seams(dips_m, volumes_m3, sd_m3, count):
@@ -36,6 +42,61 @@ def find_seams(dips_m, volumes_m3, sd_m3, count):
             if len(gains) and gains.max() > 0:
                 seams[k] = float(places[np.argmax(gains)])
     return np.array(sorted(seams))
+
+
+def find_seams_within(dips_m, volumes_m3, sd_m3, heights_m):
+    """Dips of the seams that a table shows within each declared course; empty where these fit.
+
+    Parameters
+    ----------
+    dips_m, volumes_m3, sd_m3 : (rows,) ndarray
+    heights_m : (n,) ndarray
+        Declared heights of all courses, from the bottom up.
+
+    Returns
+    -------
+    dict of {int: list of float}
+        For the courses with two or more seams in them.
+    """
+    tall = np.flatnonzero((heights_m > WIDEST_PLATE_M) | (heights_m > TALL * np.median(heights_m)))
+    some = np.flatnonzero((volumes_m3 > 0) & (dips_m > dips_m[0] + ABOVE_BOTTOM_M))
+    if not len(tall) or len(some) < MOST_ROWS // 10:
+        return {}
+    some = some[np.unique(np.linspace(0, len(some) - 1, MOST_ROWS).round().astype(int))]
+    rows = dips_m[some], volumes_m3[some], sd_m3[some]
+    edges = np.append(0.0, np.cumsum(heights_m))
+    declared = _chi2(*rows, edges[1:-1][edges[1:-1] < dips_m[-1]])[0]
+    if declared < CLEAR_RATIO * len(some):
+        return {}
+    seams = find_seams(*rows, len(heights_m) - 1)
+    shown, jumps = _chi2(*rows, seams)
+    if declared < CLEAR_RATIO * max(shown, len(some)):
+        return {}
+    is_seam = np.ones(len(seams), dtype=bool)
+    for k in range(len(seams) - 1):
+        if abs(jumps[k] + jumps[k + 1]) < OPPOSITE * max(abs(jumps[k]), abs(jumps[k + 1])):
+            is_seam[k : k + 2] = False
+    seams = seams[is_seam]
+    within = {}
+    for k in tall:
+        low, high = edges[k : k + 2]
+        inside = seams[(seams > low + FROM_ENDS_M) & (seams < high - FROM_ENDS_M)]
+        if len(inside) > 1:
+            within[int(k)] = inside.tolist()
+    return within
+
+
+def _chi2(dips, volumes, sds, seams):
+    """(chi2 of a parabola for each ring, (seams,) jumps of the slope)."""
+    x = dips / dips[-1]
+    columns = [np.ones_like(x), x, x**2]
+    for seam in seams:
+        above = np.maximum(x - seam / dips[-1], 0.0)
+        columns += [above, above**2]
+    basis = np.column_stack(columns) / sds[:, None]
+    found = np.linalg.lstsq(basis, volumes / sds, rcond=None)[0]
+    left = volumes / sds - basis @ found
+    return float(left @ left), found[3::2]
 
 
 def _gains(dips, volumes, sds, seams, places):

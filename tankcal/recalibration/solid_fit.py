@@ -17,6 +17,7 @@ from tankcal.tank.solids import LyingTank, Sphere
 FEWEST_ROWS = 8
 MOST_ROWS = 120  # that ends and tilt are chosen by; the sizes are of all rows
 LARGEST_TILT = 0.1
+HIGHEST_PART = 30.0  # diameter over the highest row: a table may end near the bottom
 _SPREAD = 0.8  # variance of the square of a rounding error over its own variance
 _FINEST = 1e-9  # of the highest volume: what a table without rounding is exact to
 _BOUND = 1e-4  # of D: an end that comes so near to a limit of its form is at it
@@ -154,7 +155,7 @@ class WetRows:
 def flat_start(rows):
     """(D, L, 0) of the flat-ended tank of the nearest volumes, D on a grid."""
     found = []
-    for part in np.linspace(0.98, 2.0, 103):
+    for part in np.append(np.linspace(0.98, 2.0, 103), np.geomspace(2.05, HIGHEST_PART, 60)):
         diameter = part * rows.height[-1]
         unit = _volumes(LyingTank(diameter, diameter, 1.0), rows.height)
         length = float(unit @ rows.volume / (unit @ unit))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 from tankcal.recalibration.former import FormerTable
 from tankcal.recalibration.solid_fit import (
     ENDS,
@@ -25,6 +26,7 @@ from tankcal.tank.solids import Sphere
 TOLD_APART = 9.0  # chi-squared above the least: three standard deviations of one unknown
 TILTS = (-0.005, 0.005)  # to start from
 NEAR = 4.0  # chi-squared above the least: two standard deviations
+LARGEST_RATIO = 1.1  # of diameters that fit as well
 _HALVINGS = 6
 _SURE = 20  # standard deviations: a tilt that is linear over them
 
@@ -126,11 +128,30 @@ def fit_lying(former: FormerTable, dip_from_a_m: float | None = None) -> LyingGe
         }
         leaning = {name: one for name, one in leaning.items() if one is not None}
         if any(one.variance_factor == 1 for one in leaning.values()):
-            best, worse = _chosen(leaning)
+            fits = leaning
+            best, worse = _chosen(fits)
+    _refuse_low_rows(former, rows, [fits[name] for name, by in worse.items() if by < TOLD_APART])
     whole = _again(all_rows, best, dip_from_a_m)
     if whole is None:
         raise SolutionError(no_fit())
     return LyingGeometry(whole, worse, *_tilt(rows, all_rows, best, whole, dip_from_a_m))
+
+
+def _refuse_low_rows(former, rows, fits):
+    """SolutionError where tanks of very different diameters explain the rows as well."""
+    diameters = [float(one.values[0]) for one in fits]
+    if max(diameters) > LARGEST_RATIO * min(diameters):
+        raise SolutionError(
+            message(
+                "read_low_rows",
+                "{name}: the rows up to {last:.4g} m do not reach high enough to tell diameter "
+                "from length and ends: diameters from {least:.3g} to {most:.3g} m fit as well",
+                name=str(former.name),
+                last=float(rows.height[-1]),
+                least=min(diameters),
+                most=max(diameters),
+            )
+        )
 
 
 def _level_fits(rows, dip_from_a_m):

@@ -11,10 +11,12 @@ import numpy as np
 
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
+from tankcal.recalibration.bulges import bulge_derivatives, bulge_volume_m3, prior_sds
 from tankcal.recalibration.fittings import Fitting
 from tankcal.recalibration.upright_shell import Rings
 
 ZERO_SD_M, SEAM_SD_M, KINK_SD_M = 0.1, 0.05, 1.0  # so weak that a table decides; never singular
+BULGED_ZERO_SD_M = 0.03  # profiles hide the joints, by which a table shows its zero
 DENSITY_SD_KG_M3 = 1e5
 MOST_ROUNDS, MOST_HALVINGS, SETTLED = 15, 6, 1e-3  # of chi2
 
@@ -48,6 +50,10 @@ class State:
         Of the head.
     density_sd_kg_m3 : float
         Of the density that an adjustment starts with, as an observation of it.
+    usual_density_kg_m3 : float or None
+        The density to which `density_sd_kg_m3` belongs; None: with which an adjustment starts.
+    bulges_m : ndarray, shape (n, degrees), or None
+        Profiles of the courses (`bulges`); None: straight courses.
     """
 
     base_m3: float
@@ -66,6 +72,8 @@ class State:
     free: frozenset = frozenset({"base", "density"})
     is_first_order: bool = True
     density_sd_kg_m3: float = DENSITY_SD_KG_M3
+    usual_density_kg_m3: float | None = None
+    bulges_m: np.ndarray | None = None
 
     @property
     def rings(self):
@@ -76,12 +84,19 @@ class State:
     def volume_m3(self, dips_m):
         """(rows,) volume below each dip."""
         dips = np.append(dips_m, self.lowest_m)
-        shell = self.rings.volume_m3(dips, self.radii_m, self.density_kg_m3)
+        shell = self.shell_m3(dips)
         volume = self.base_m3 + shell[:-1] - shell[-1]
         for one in self.fittings:
             below = one.volume_below_m3(dips)
             volume = volume + below[:-1] - below[-1]
         return volume + self._roof_share(dips_m) * self.roof_m3
+
+    def shell_m3(self, dips_m):
+        """(rows,) volume of the courses below each dip."""
+        volume = self.rings.volume_m3(dips_m, self.radii_m, self.density_kg_m3)
+        if self.bulges_m is None:
+            return volume
+        return volume + bulge_volume_m3(self.rings, dips_m, self.radii_m, self.bulges_m)
 
     def _roof_share(self, dips_m):
         if self.roof_zone_m is None:
@@ -98,6 +113,7 @@ class State:
             "density": int("density" in self.free),
             "zero": int("zero" in self.free),
             "seams": len(self.seams_m) * ("seams" in self.free),
+            "bulges": 0 if self.bulges_m is None else self.bulges_m.size,
             "fittings": 3 * len(self.fittings),
             "roof": int(self.roof_zone_m is not None),
         }
@@ -117,6 +133,7 @@ class State:
             "density": [self.density_kg_m3],
             "zero": [self.zero_m],
             "seams": self.seams_m,
+            "bulges": [] if self.bulges_m is None else self.bulges_m.ravel(),
             "fittings": np.ravel(things),
             "roof": [self.roof_m3],
         }
@@ -134,6 +151,8 @@ class State:
                 changes[key] = float(given[name][0])
         if len(given["seams"]):
             changes["seams_m"] = given["seams"]
+        if self.bulges_m is not None:
+            changes["bulges_m"] = given["bulges"].reshape(self.bulges_m.shape)
         things = given["fittings"].reshape(-1, 3)
         changes["fittings"] = tuple(Fitting(*map(float, one)) for one in things)
         return replace(self, **changes)
@@ -144,13 +163,20 @@ class State:
         by_radius, by_density, by_edge = self.rings.derivatives(
             dips, self.radii_m, self.density_kg_m3
         )
+        by_bulge, by_zero = np.zeros((len(dips), 0)), by_edge.sum(axis=1, keepdims=True)
+        if self.bulges_m is not None:
+            by_bulge, *more = bulge_derivatives(self.rings, dips, self.radii_m, self.bulges_m)
+            by_radius, by_edge, by_zero = (
+                one + also for one, also in zip((by_radius, by_edge, by_zero), more, strict=True)
+            )
         columns = [by_radius]
         if "density" in self.free:
             columns.append(by_density[:, None])
         if "zero" in self.free:
-            columns.append(by_edge.sum(axis=1, keepdims=True))
+            columns.append(by_zero)
         if "seams" in self.free:
             columns.append(by_edge[:, 1:])
+        columns += [by_bulge]
         columns += [one.derivatives(dips) for one in self.fittings]
         relative = np.hstack(columns)
         parts = [relative[:-1] - relative[-1]]
@@ -177,6 +203,8 @@ class Fit:
     design : ndarray, shape (rows, u)
     chi2 : float
         Of the rows.
+    bulges : (ndarray, ndarray, ndarray)
+        Of what bulges are expected to be: (k, u) derivatives, (k,) discrepancies, (k,) sds.
     """
 
     state: State
@@ -185,6 +213,12 @@ class Fit:
     sd_m3: np.ndarray
     design: np.ndarray
     chi2: float
+    bulges: tuple[np.ndarray, np.ndarray, np.ndarray]
+
+    @property
+    def cost(self):
+        """chi2, with that of the bulges."""
+        return self.chi2 + float(np.sum((self.bulges[1] / self.bulges[2]) ** 2))
 
     @property
     def dof(self):
@@ -243,7 +277,16 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     cofactor[np.ix_(moving, moving)] = found.cofactor
     left = volumes_m3 - now.volume_m3(dips_m)
     chi2 = float(np.sum((left / sd_m3) ** 2))
-    return Fit(now, cofactor, left, sd_m3, now.design(dips_m), chi2)
+    bulges = _expected_bulges(now)
+    return Fit(now, cofactor, left, sd_m3, now.design(dips_m), chi2, bulges)
+
+
+def _expected_bulges(state):
+    """Derivatives, discrepancies and sds of the bulges as observations of their own."""
+    part = np.eye(len(state.unknowns))[state.layout["bulges"]]
+    if not len(part):
+        return part, np.zeros(0), np.zeros(0)
+    return part, -state.bulges_m.ravel(), prior_sds(state.bulges_m).ravel()
 
 
 def _tangent(w, design):
@@ -256,8 +299,12 @@ def _priors(state):
     layout = state.layout
     sds, held = {}, []
     density_sd = state.density_sd_kg_m3
-    for name, sd in (("zero", ZERO_SD_M), ("seams", SEAM_SD_M), ("density", density_sd)):
+    zero_sd = ZERO_SD_M if state.bulges_m is None else BULGED_ZERO_SD_M
+    for name, sd in (("zero", zero_sd), ("seams", SEAM_SD_M), ("density", density_sd)):
         sds |= dict.fromkeys(range(layout[name].start, layout[name].stop), sd)
+    if state.bulges_m is not None:
+        places = range(layout["bulges"].start, layout["bulges"].stop)
+        sds |= dict(zip(places, prior_sds(state.bulges_m).ravel(), strict=True))
     for k, one in enumerate(state.fittings):
         place = layout["fittings"].start + 3 * k
         for edge, is_held in enumerate(held_kinks(state, one)):
@@ -267,7 +314,11 @@ def _priors(state):
                 sds[place + edge] = KINK_SD_M
     known = np.array(list(sds), dtype=int)
     about = state.unknowns[known]
-    about[np.isin(known, np.arange(len(state.unknowns))[layout["zero"]])] = 0.0
+    for name in ("zero", "bulges"):
+        about[np.isin(known, np.arange(len(state.unknowns))[layout[name]])] = 0.0
+    if state.usual_density_kg_m3 is not None:
+        is_density = np.isin(known, np.arange(len(state.unknowns))[layout["density"]])
+        about[is_density] = state.usual_density_kg_m3
     return np.array(held, dtype=int), known, about, np.array(list(sds.values()))
 
 
@@ -299,6 +350,12 @@ class Rows:
     def of(self, mask):
         """Those of a mask."""
         return Rows(self.dip_m[mask], self.volume_m3[mask], self.sd_m3[mask])
+
+    def thinned(self, most):
+        """At most so many of them, evenly, the first and the last among them."""
+        chosen = np.zeros(len(self.dip_m), dtype=bool)
+        chosen[np.unique(np.linspace(0, len(self.dip_m) - 1, most).round().astype(int))] = True
+        return self.of(chosen)
 
     def adjust(self, state):
         """The Fit of a State to them."""

@@ -11,6 +11,10 @@ from tankcal.recalibration.solid_geometry import declared_sizes, declared_uncert
 
 USUAL_TEMPERATURE_C = 20.0
 UNKNOWN_ZERO_M = 0.02
+LOWEST_THING_M = 2e-4  # height of a thing in deadwood.csv, whose dips have four decimals
+LEAST_RISE_M3 = 1e-6  # between rows of bottom.csv, whose volumes have six decimals
+LEVEL_M = 1e-5  # last digit of the dips in bottom.csv
+EMPTY_BELOW_M = 0.001  # of a first row without volume
 SURE = 3.0  # standard uncertainties, within which a bottom is flat and a zero is at the bottom
 
 
@@ -52,14 +56,15 @@ def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
     """
     density = 0.0 if found.head == "without" else found.state.density_kg_m3
     zero, bottom = _bottom(former, found)
+    heights = found.heights_m + np.eye(1, len(found.heights_m))[0] * (found.zero_m.value - zero)
     note = message("job_read_from", "read from {name}", name=str(former.name))
     settings = _settings(
         former,
         tank_id=tank_id,
         diameter=2 * float(found.radii_m[0]),
-        height=float(np.sum(found.heights_m)),
+        height=float(np.sum(heights)),
         zero=zero,
-        density=max(round(density, 1), 0.0),
+        density=round(density, 1),
         source="table",
         u_common_m=u_common_m,
         e_pa=e_pa,
@@ -67,21 +72,20 @@ def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
     )
     texts = {
         "job.toml": settings + _roof(former),
-        **_wall(names, found.heights_m, found.thickness_m, found.radii_m),
+        **_wall(names, heights, found.thickness_m, found.radii_m),
     }
     if bottom is not None:
         texts["bottom.csv"] = _csv(("level_m", "volume_m3"), bottom, (5, 6))
+    things = _deadwood(found, zero + float(np.sum(heights)))
     names_of_things = [
-        message("job_thing", "thing-{number}", number=k) for k in range(1, len(found.fittings) + 1)
+        message("job_thing", "thing-{number}", number=k) for k in range(1, len(things) + 1)
     ]
-    things = [
-        (name, f"{max(one.bottom_m.value, 0):.4f}", f"{one.top_m.value:.4f}",
-         f"{one.volume_m3.value:.5f}", f"{one.volume_m3.u:.5f}")
-        for name, one in zip(names_of_things, found.fittings, strict=True)
-    ]  # fmt: skip
     if things:
+        rows = [(name, *thing) for name, thing in zip(names_of_things, things, strict=True)]
         heading = ("name", "bottom_m", "top_m", "volume_m3", "u_m3")
-        texts["deadwood.csv"] = "\n".join(map(",".join, [heading, *things])) + "\n"
+        texts["deadwood.csv"] = "\n".join(map(",".join, [heading, *rows])) + "\n"
+    if found.state.bulges_m is not None:
+        texts["uncertainty.csv"] = _profiles(found.state.bulges_m)
     words = (note, *names_of_things)
     return JobOfTable(texts, found.covariance_m2, tuple(names), words)
 
@@ -232,6 +236,30 @@ def _csv(heading, rows, decimals):
     return "\n".join(lines) + "\n"
 
 
+def _profiles(bulges_m):
+    """uncertainty.csv of the profiles that the table shows: the job has straight courses."""
+    barrel = 1.5 * np.sqrt(np.mean(np.sum(bulges_m[:, 1::2] ** 2, axis=1)))
+    taper = np.sqrt(np.mean(np.sum(bulges_m[:, ::2] ** 2, axis=1)))
+    rows = [f"{name},{1000 * u:.3g},mm" for name, u in (("barrel", barrel), ("taper", taper))]
+    return "\n".join(["input,u,unit", *rows]) + "\n"
+
+
+def _deadwood(found, top_m):
+    """Rows of deadwood.csv: bottom, top, volume, u of each thing within the rows that were used.
+
+    The volume below the lowest row that was used belongs to the bottom, and a table does not show
+    what is above its last row: the part of a thing there is left out.
+    """
+    rows = []
+    for one in found.fittings:
+        low, high = max(one.bottom_m.value, found.lowest_m), min(one.top_m.value, top_m)
+        share = (high - low) / max(one.top_m.value - one.bottom_m.value, 1e-9)
+        if high - low > LOWEST_THING_M:
+            volume, u = share * one.volume_m3.value, share * one.volume_m3.u
+            rows.append((f"{low:.4f}", f"{high:.4f}", f"{volume:.5f}", f"{u:.5f}"))
+    return rows
+
+
 def _bottom(former, found):
     """Dip of the bottom of the first ring, and what lies below the lowest row that was used.
 
@@ -239,7 +267,7 @@ def _bottom(former, found):
     and the second is None. Else they are (rows, 2) dips and volumes up to that row.
     """
     base, lowest, zero, state = found.base_m3, found.lowest_m, found.zero_m, found.state
-    shell = state.rings.volume_m3(np.array([lowest]), state.radii_m, state.density_kg_m3)[0]
+    shell = state.shell_m3(np.array([lowest]))[0]
     area = np.pi * state.radii_m[0] ** 2
     level = zero.value + (shell - base.value) / area
     below = former.height_m < lowest - 1e-9
@@ -249,15 +277,37 @@ def _bottom(former, found):
     is_near = abs(level - zero.value) <= SURE * (u + found.expected_m3 / area)
     if is_near and np.all(np.abs(volumes - flat) < SURE * found.expected_m3):
         return level, None
-    rows = [*zip(dips, volumes, strict=True), (lowest, base.value)]
-    if rows[0][0] > zero.value or len(rows) == 1:
-        rows.insert(0, _at_bottom(rows, zero.value, base.value - shell))
-    return zero.value, np.array(rows)
+    rows = _rising([*zip(dips, volumes, strict=True), (lowest, max(base.value, 0.0))])
+    floor = np.floor(min(zero.value, 0.0) / LEVEL_M) * LEVEL_M  # not above the shell when rounded
+    if (rows[0][0] > floor and rows[0][1] > 0) or len(rows) == 1:
+        rows.insert(0, _row_below(rows, area, floor))
+    return min(zero.value, lowest), np.array(rows)
 
 
-def _at_bottom(rows, zero, below_shell):
-    """(dip, volume) of the bottom of the first ring, that rows begin above."""
-    if len(rows) == 1:
-        return min(zero, rows[0][0] - 0.001), max(below_shell, 0.0)
-    (low, first), (high, second) = rows[:2]
-    return zero, max(first - (second - first) / (high - low) * (low - zero), 0.0)
+def _rising(rows):
+    """Rows of bottom.csv, from the last one down, without those that are not below the next row.
+
+    Coarse rounding repeats volumes, and a job refuses a bottom whose volumes do not rise.
+    """
+    kept = [rows[-1]]
+    for dip, volume in reversed(rows[:-1]):
+        if volume < kept[0][1] - LEAST_RISE_M3 or volume == kept[0][1] == 0:
+            kept.insert(0, (dip, volume))
+    return kept
+
+
+def _row_below(rows, area_m2, floor_m):
+    """(dip, volume) below the first row: at the dip `floor_m`, or above it where the tank is empty.
+
+    The two lowest rows are extended; a single row by the area of the shell.
+    """
+    (low, first), slope = rows[0], area_m2
+    if len(rows) > 1:
+        slope = (rows[1][1] - first) / (rows[1][0] - low)
+    if first <= 0:
+        return low - EMPTY_BELOW_M, 0.0
+    empty = low - first / slope
+    if empty > floor_m:
+        return empty, 0.0
+    dip = min(floor_m, low - EMPTY_BELOW_M)
+    return dip, max(slope * (dip - empty), 0.0)

@@ -28,7 +28,10 @@ STEEL_PA = 206e9
 START_DENSITY_KG_M3 = 500.0
 USUAL_KG_M3 = 450.0, 450.0  # of a head that a table cannot tell: about this, with this sd
 DECLARED_SD_KG_M3 = 10.0
+HELD_SD_KG_M3 = 0.1  # of a density that rows must not move
 LIQUID_KG_M3 = 500.0  # a head that a table could not have shown of any liquid is undecided
+LIGHTEST_KG_M3 = 100.0  # a lower density of a head is that of no liquid
+DENSEST_KG_M3 = 2000.0  # of a liquid that is stored in such tanks; sulphuric acid has 1840
 FEWEST_ROWS = 3  # of a ring
 BY_ORDER = 1.0  # of chi2, by which the head of second order has to fit better
 ORDER_IS_CLEAR = 9.0
@@ -177,7 +180,7 @@ def read_upright(
         used &= ~empty
     usable = rows.of(used)
     state = _start(usable, heights, plates, modulus_pa, zone)
-    found = search(usable, state, lowest_m)
+    found = search(usable, state, lowest_m, _usual_density(former))
     used &= rows.dip_m >= found.state.lowest_m - 1e-9
     return _geometry(former, found, rows, used, seams_known)
 
@@ -219,27 +222,29 @@ def _start(rows, heights, plates, modulus, zone):
 
 def _geometry(former, found, rows, used, seams_known):
     chosen = rows.of(used)
-    found = with_sure_fittings(
-        chosen, _with_known_zero(chosen, former, found), former.volume_quantum_m3
-    )
-    found, other = _with_order(chosen, found)
-    seams = found if "seams" in found.state.free else _free_seams(chosen, found)
-    if seams is not None and (not seams_known or _are_elsewhere(found, seams)):
-        found = seams = without_phantoms(chosen, seams, former.volume_quantum_m3)
-    seams_are = "found" if "seams" in found.state.free else "declared"
     quantum = former.volume_quantum_m3
+    found = _with_known_zero(chosen, former, found)
+    is_bulged = found.state.bulges_m is not None
+    other = seams = None
+    if not is_bulged:
+        found, other = _with_order(chosen, with_sure_fittings(chosen, found, quantum))
+        seams = found if "seams" in found.state.free else _free_seams(chosen, found)
+    if seams is not None and (not seams_known or _are_elsewhere(found, seams)):
+        found = seams = without_phantoms(chosen, seams, quantum)
+    seams_are = "found" if "seams" in found.state.free else "declared"
     scale = scale_of_u(found, chosen, quantum)
     layout, by_order = found.state.layout, _by_order(found, other)
     u_density = float(np.hypot((found.sd("density") * scale[layout["density"]])[0], by_order[0]))
     t = found.state.density_kg_m3 / u_density
     density = Reading(found.state.density_kg_m3, u_density)
-    head, without = _decide_head(t, u_density), None
+    is_rough = is_bulged or roughness(found, chosen) > 1
+    head, without = _decide_head(density, former.liquid_density_kg_m3, is_rough), None
     independent = _independent(found)
     dry = _without_head(chosen, found)
     if head != "without":
         without = (*_remainders(dry.left_m3), dry.state.radii_m)
     if head == "undecided":
-        found, other = _with_usual_density(chosen, former, found), None
+        found, other = _with_usual_density(chosen, former, found, dry), None
     if head == "without":
         found, other = dry, None
     found = without_phantoms(chosen, found, quantum)
@@ -325,19 +330,50 @@ def _without_head(rows, found):
     return found or rows.adjust(replace(dry, free=free - {"kinks", "zero"}))
 
 
-def _with_usual_density(rows, former, found):
+def _usual_density(former):
+    """(density, sd) of the declared head, or of the head of some liquid or none."""
+    declared = former.liquid_density_kg_m3
+    return USUAL_KG_M3 if declared is None else (declared, DECLARED_SD_KG_M3)
+
+
+def _with_usual_density(rows, former, found, dry):
     """The Fit with the declared density, or that of some liquid or none: the table cannot tell."""
-    usual, sd = USUAL_KG_M3
-    if former.liquid_density_kg_m3 is not None:
-        usual, sd = former.liquid_density_kg_m3, DECLARED_SD_KG_M3
-    state = replace(found.state, density_kg_m3=usual, density_sd_kg_m3=sd)
-    return tried(rows, state) or found
+    usual, sd = _usual_density(former)
+    state = replace(
+        found.state, density_kg_m3=usual, usual_density_kg_m3=usual, density_sd_kg_m3=sd
+    )
+    again = tried(rows, state) or found
+    density = again.state.density_kg_m3
+    if LIGHTEST_KG_M3 <= density <= DENSEST_KG_M3:
+        return again
+    # No liquid has this density: the shell is that of the nearest possible one, and u stays.
+    if density > DENSEST_KG_M3:
+        nearest = tried(rows, replace(state, density_sd_kg_m3=HELD_SD_KG_M3)) or dry
+    else:
+        nearest = dry
+    possible = replace(nearest.state, free=again.state.free)
+    return replace(again, state=possible, left_m3=nearest.left_m3, chi2=nearest.chi2)
 
 
-def _decide_head(t, u_density):
-    if t > CRITICAL:
+def _decide_head(density, declared_kg_m3, is_rough):
+    """Whether a table has a head: "with", "without" or "undecided".
+
+    A wall that bulges, and rows with more in them than rounding, look like a head: there a declared
+    density holds. A density that no liquid has is none.
+    """
+    if is_rough and declared_kg_m3 is not None:
+        return "undecided" if declared_kg_m3 > 0 else "without"
+    if not is_possible(density):
+        return "undecided"
+    if density.value > CRITICAL * density.u:
         return "with"
-    return "without" if CRITICAL * u_density < LIQUID_KG_M3 else "undecided"
+    return "without" if CRITICAL * density.u < LIQUID_KG_M3 else "undecided"
+
+
+def is_possible(density):
+    """Whether a liquid may have the density of a Reading, within its u."""
+    reach = CRITICAL * density.u
+    return -reach <= density.value <= DENSEST_KG_M3 + reach
 
 
 def _remainders(left):

@@ -14,9 +14,10 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import SolutionError
 from tankcal.messages import message
+from tankcal.recalibration.bulges import no_bulges, show_bulges
 from tankcal.recalibration.fittings import find_fittings, in_other_pairs
-from tankcal.recalibration.rounding import ROUGH, rounded_again, scale_of_u
-from tankcal.recalibration.table_fit import tried
+from tankcal.recalibration.rounding import ROUGH, roughness, rounded_again, scale_of_u
+from tankcal.recalibration.table_fit import DENSITY_SD_KG_M3, tried
 from tankcal.recalibration.zero import FARTHEST_M, find_zeros, move_seams
 
 SEAMS_FREE = "base", "density", "seams"
@@ -33,12 +34,17 @@ USUAL_ZEROS_M = 0.0, -0.04, 0.04  # that are tried, too, where things are many
 NEAR_M = 0.025  # that the zero may go from where it was looked for
 CUT_M, CUT_ROWS = 0.4, 9  # of the rows that have to be of one cut, so that the bottom is below
 BOTTOM_TRIES = 60
+BULGED_DEGREE, MOST_BULGED_ROWS = 4, 400  # of the volume in CUT_M; of a search for things
+SURE_OF_BULGED = 8.0  # standard uncertainties of a thing where courses bulge
+JOINT_M, DRAWN_IN_M = 0.15, 3e-3  # about a joint; of the radius
+LONGEST_BULGED_M = 1.2  # of a thing where courses bulge: a longer thing looks like their profile
 LOW_M, LOW_SHARE = 0.15, 0.2  # things lower than this take no more of the cut: that is the bottom
+TAKEN_SHARE, GIVEN_SHARE = 0.7, 0.1  # of the cut, that a thing takes or gives at most
 EDGE_M = 0.1  # below the first seam: where rows of the first ring end, the zero being unknown
 SAME_ZERO = 3.0  # standard deviations
 
 
-def search(rows, state, lowest_m):
+def search(rows, state, lowest_m, usual_density):
     """The Fit of all that is found in rows.
 
     Parameters
@@ -48,6 +54,9 @@ def search(rows, state, lowest_m):
         With start values.
     lowest_m : float or None
         Dip of the highest point of the bottom; None: found.
+    usual_density : (float, float)
+        Density of the head and its standard deviation, kg/m3, for courses that bulge: a taper of
+        the courses looks like a head.
 
     Returns
     -------
@@ -58,6 +67,25 @@ def search(rows, state, lowest_m):
     SolutionError
         When the rows do not determine the radii.
     """
+    edges = state.rings.edges_m
+    shows_bulges = show_bulges(rows.dip_m, rows.volume_m3, rows.sd_m3, edges)
+    if shows_bulges:
+        found = _search_bulged(rows, state, lowest_m, *usual_density)
+        if found is not None and not _is_straight(rows, found):
+            return found
+    found = _search_straight(rows, state, lowest_m)
+    if shows_bulges or _is_plain(found) or _is_by_rounding(found):
+        return found
+    # Many things, or things that end at joints: that is what a coarse table makes of bulges.
+    bulged = _search_bulged(rows, state, lowest_m, *usual_density)
+    is_simpler = bulged is not None and (
+        len(bulged.state.fittings) < len(found.state.fittings) and _cost(bulged) < _cost(found)
+    )
+    return bulged if is_simpler else found
+
+
+def _search_straight(rows, state, lowest_m):
+    """The Fit of straight courses; arguments as of `search`."""
     if lowest_m is not None:
         rows = rows.above(lowest_m)
         return _with_moved_seams(rows, _with_fittings(rows, state))
@@ -72,6 +100,75 @@ def search(rows, state, lowest_m):
         if _is_by_rounding(whole) and _is_enough(rows, found, whole):
             return whole
     return found
+
+
+def _search_bulged(rows, state, lowest_m, density, density_sd):
+    """The Fit of courses that bulge, with things that the profiles do not explain; None: fails.
+
+    Seams are where they were declared. What the profiles leave goes on from row to row, and two
+    kinks explain some of it: a thing has to explain more than that.
+    """
+    lowest = _lowest_row(rows, state, BULGED_DEGREE) if lowest_m is None else lowest_m
+    start = replace(
+        state,
+        bulges_m=no_bulges(len(state.radii_m)),
+        density_kg_m3=density,
+        usual_density_kg_m3=density,
+        density_sd_kg_m3=density_sd,
+    )
+    some = rows.above(lowest).thinned(MOST_BULGED_ROWS)
+    best = None
+    for zero in USUAL_ZEROS_M:
+        other = _with_free_zero(some.above(zero + NEAR_M), replace(start, zero_m=zero), zero)
+        if other and (best is None or _cost(other) < _cost(best) - LEAST_GAIN):
+            best = other
+    if best is None:
+        return None
+    about = best.state.zero_m
+    some = some.above(best.state.lowest_m)
+    while len(best.state.fittings) < MOST_FITTINGS:
+        again = _with_one_more(some, best, LONGEST_BULGED_M, about, rough=True)
+        if again is None:
+            break
+        best = again
+    best = tried(rows.above(max(lowest, best.state.lowest_m)), _without_unsure(some, best).state)
+    return best and _with_lower_rows(rows.above(lowest), best)
+
+
+def _is_straight(rows, found):
+    """Whether straight courses with the same things explain the rows as well as profiles do."""
+    state = replace(
+        found.state,
+        bulges_m=None,
+        usual_density_kg_m3=None,
+        density_sd_kg_m3=DENSITY_SD_KG_M3,
+    )
+    straight = tried(rows.above(found.state.lowest_m), state)
+    return straight is not None and straight.chi2 < found.cost + PRICE
+
+
+def _without_unsure(rows, found):
+    """The Fit without the things that are not sure where courses bulge."""
+    while found.state.fittings:
+        sds = found.sd("fittings")[2::3] * roughness(found, rows)
+        sizes = np.abs([one.volume_m3 for one in found.state.fittings]) / np.maximum(sds, 1e-12)
+        worst = int(np.argmin(sizes))
+        rest = found.state.fittings[:worst] + found.state.fittings[worst + 1 :]
+        again = tried(rows, replace(found.state, fittings=rest))
+        if sizes[worst] >= SURE_OF_BULGED or again is None:
+            break
+        found = again
+    return found
+
+
+def _is_of_joint(state, thing):
+    """Whether a thing gives room, or is what plates that are drawn in at a joint look like."""
+    joints = state.rings.edges_m
+    ends = np.array([[thing.bottom_m], [thing.top_m]])
+    girth = 2 * np.pi * float(state.radii_m[0])
+    thickness = -thing.volume_m3 / (girth * max(thing.top_m - thing.bottom_m, 1e-9))
+    is_near = bool(np.any(np.abs(ends - joints) < JOINT_M))
+    return thickness <= 0 or (is_near and thickness < DRAWN_IN_M)
 
 
 def _with_moved_seams(rows, found):
@@ -103,10 +200,11 @@ def _is_by_rounding(found):
     return found.chi2 < ROUGH**2 * max(found.dof, 1) and worst < np.sqrt(3) * 1.25
 
 
-def _lowest_row(rows, state):
+def _lowest_row(rows, state, degree=2):
     """Dip from which on rows are those of one cut: above the highest point of the bottom.
 
-    The lowest row of the first ring above which a parabola leaves nothing but rounding.
+    The lowest row of the first ring above which a parabola, or a polynomial of another degree for
+    courses that bulge, leaves nothing but rounding.
     """
     first = rows.dip_m <= state.seams_m[0] - EDGE_M if len(state.seams_m) else rows.dip_m >= 0
     ring = rows.of(first)
@@ -117,7 +215,7 @@ def _lowest_row(rows, state):
     for place in [int(tries[0]), *_halving(tries)]:
         dip = ring.dip_m[place]
         window = ring.of((ring.dip_m >= dip) & (ring.dip_m <= dip + length + 1e-9))
-        if _is_one_cut(window):
+        if _is_one_cut(window, degree):
             return float(dip)
     return float(rows.dip_m[0])
 
@@ -129,15 +227,15 @@ def _halving(tries):
     return tries[np.unique(places)]
 
 
-def _is_one_cut(ring):
-    """Whether a parabola leaves no more than rounding of rows."""
-    if len(ring.dip_m) < 5:
+def _is_one_cut(ring, degree):
+    """Whether a polynomial leaves no more than rounding of rows."""
+    if len(ring.dip_m) < degree + 3:
         return False
     x = (ring.dip_m - ring.dip_m[0]) / (ring.dip_m[-1] - ring.dip_m[0])
-    basis = np.vander(x, 3) / ring.sd_m3[:, None]
+    basis = np.vander(x, degree + 1) / ring.sd_m3[:, None]
     value = (ring.volume_m3 - ring.volume_m3[0]) / ring.sd_m3
     left = value - basis @ np.linalg.lstsq(basis, value, rcond=None)[0]
-    dof = len(x) - 3
+    dof = len(x) - degree - 1
     is_rounding = np.abs(left).max() < np.sqrt(3) * 1.25
     lower = left[: max(len(left) // 4, 2)]  # a bottom shows here first
     return (
@@ -206,7 +304,7 @@ def _is_plain(found):
 
 
 def _cost(found):
-    return found.chi2 + PRICE * len(found.state.fittings)
+    return found.cost + PRICE * len(found.state.fittings)
 
 
 def _from_zero(rows, start, at_most):
@@ -225,18 +323,30 @@ def _from_zero(rows, start, at_most):
     return _tidied(rows, found, about) if found else None
 
 
-def _with_one_more(rows, found, longest, about):
-    """The Fit with the thing that explains most; None where none explains enough."""
-    candidates = find_fittings(rows.dip_m, found.left_m3, found.design, rows.sd_m3, longest)
+def _with_one_more(rows, found, longest, about, rough=False):
+    """The Fit with the thing that explains most; None where none explains enough.
+
+    rough  whether more than rounding is left over: enough is then measured by what is left
+    """
+    design, left, sds = found.bulges  # observations that no thing changes: as at the lowest row
+    candidates = find_fittings(
+        np.append(np.full(len(sds), rows.dip_m[0]), rows.dip_m),
+        np.append(left, found.left_m3),
+        np.vstack([design, found.design]),
+        np.append(sds, rows.sd_m3),
+        longest,
+    )
     for thing, gain in candidates:
         if gain < LEAST_GAIN:
             break
         more = replace(found.state, fittings=(*found.state.fittings, thing))
         again = _with_free_zero(rows, more, about)
+        factor = roughness(again, rows) ** 2 if rough and again else 1.0
         if (
             again
-            and found.chi2 - again.chi2 > LEAST_GAIN
+            and found.cost - again.cost > LEAST_GAIN * factor
             and _is_large(rows, again.state.fittings[-1])
+            and not (rough and _is_of_joint(again.state, again.state.fittings[-1]))
         ):
             return again
     return None
@@ -329,9 +439,11 @@ def _cheaper(rows, found, fittings, about):
 
 def _is_possible(found):
     state = found.state
-    largest = LOW_SHARE * np.pi * state.radii_m[0] ** 2
+    cut = np.pi * state.radii_m[0] ** 2
+    largest = LOW_SHARE * cut
     return abs(state.zero_m) <= FARTHEST_M and all(
         one.bottom_m < one.top_m
+        and -TAKEN_SHARE * cut < one.volume_m3 / (one.top_m - one.bottom_m) < GIVEN_SHARE * cut
         and (
             one.bottom_m > state.lowest_m + LOW_M
             or abs(one.volume_m3) < largest * (one.top_m - one.bottom_m)

@@ -1,0 +1,110 @@
+"""The profile of each course, which bulges and tapers about its mean radius.
+
+With zeta from -1 at the lower joint of a course to 1 at the upper joint, the radius is
+r + sum over j of b_j P_j(zeta), P_j the Legendre polynomials of the degrees 1 to 10. Their mean
+over a course is 0, so that r remains the mean radius, and they add no volume at a joint:
+
+    V(zeta) = pi r H sum over j of b_j Q_j(zeta),     Q_j = (P_j+1 - P_j-1) / (2 j + 1)
+"""
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+
+from tankcal.recalibration.upright_shell import Rings
+
+DEGREES = np.arange(1, 11)
+BULGE_SD_M = 4e-3  # of degree 2: bulges of shells are a few millimetres
+FALL = 1.5  # sds of the higher degrees are as (2 / degree)^1.5: profiles are smooth but at joints
+TAPER_SD_M = 0.5e-3  # of degree 1, which looks like the head
+# Taper over bulge: a bulge whose highest point is a third of the course away from a joint has 0.22.
+TAPER_SHARE = 0.3
+EDGE_M = 0.03  # next to a joint, where a zero that is not known yet moves it
+SMOOTH_SHARE, CLEAR_GAIN = 0.2, 50.0  # of chi2: left by a smooth profile; gained in each course
+FEWEST_ROWS = 10  # of a course
+
+
+def no_bulges(count):
+    """Coefficients b of `count` courses, all 0; shape (count, degrees)."""
+    return np.zeros((count, len(DEGREES)))
+
+
+def prior_sds(bulges_m):
+    """Standard deviations of b before an adjustment, the taper's by the bulges that were found."""
+    sds = np.tile(BULGE_SD_M * (2 / DEGREES) ** FALL, (len(bulges_m), 1))
+    size = float(np.sqrt(np.mean(bulges_m[:, 1] ** 2)))
+    sds[:, 0] = TAPER_SHARE * size if size > 0 else TAPER_SD_M
+    return sds
+
+
+def largest_bulge_m(bulges_m):
+    """The largest distance of a profile from the mean radius of its course."""
+    zeta = np.linspace(-1, 1, 41)
+    return float(np.abs(legvander(zeta, int(DEGREES[-1]))[:, DEGREES] @ bulges_m.T).max())
+
+
+def bulge_volume_m3(rings: Rings, dips_m, radii_m, bulges_m):
+    """(rows,) volume that the profiles add below each dip."""
+    return np.einsum("rcj,cj->r", _unit_volumes(rings, dips_m, radii_m)[0], bulges_m)
+
+
+def bulge_derivatives(rings: Rings, dips_m, radii_m, bulges_m):
+    """Derivatives of `bulge_volume_m3`.
+
+    Returns
+    -------
+    by_bulge : (rows, courses * degrees) ndarray
+    by_radius, by_edge : (rows, courses) ndarray
+        By the edges but that at the top of the last course.
+    by_zero : (rows, 1) ndarray
+        By all edges together.
+    """
+    unit, zeta, p, is_inside = _unit_volumes(rings, dips_m, radii_m)
+    by_radius = np.einsum("rcj,cj->rc", unit, bulges_m) / radii_m
+    profile = np.einsum("rcj,cj->rc", p, bulges_m) * is_inside
+    half = by_radius * radii_m / np.diff(rings.edges_m)
+    lower = -half - np.pi * radii_m * (1 - zeta) * profile
+    upper = half - np.pi * radii_m * (1 + zeta) * profile
+    by_zero = (lower + upper).sum(axis=1, keepdims=True)
+    lower[:, 1:] += upper[:, :-1]
+    return unit.reshape(len(unit), -1), by_radius, lower, by_zero
+
+
+def _unit_volumes(rings, dips_m, radii_m):
+    """Volumes of b = 1 m (rows, courses, degrees); zeta, P_j and whether a dip is in a course."""
+    heights = np.diff(rings.edges_m)
+    zeta = 2 * (np.asarray(dips_m)[:, None] - rings.edges_m[:-1]) / heights - 1
+    is_inside = (zeta > -1) & (zeta < 1)
+    zeta = np.clip(zeta, -1.0, 1.0)
+    p = legvander(zeta, int(DEGREES[-1]) + 1)
+    q = (p[..., DEGREES + 1] - p[..., DEGREES - 1]) / (2 * DEGREES + 1)
+    return np.pi * (radii_m * heights)[:, None] * q, zeta, p[..., DEGREES], is_inside
+
+
+def show_bulges(dips_m, volumes_m3, sd_m3, edges_m):
+    """Whether rows of most courses follow a smooth profile that is no cylinder with a head.
+
+    A thing in the tank has kinks: a smooth profile of its course leaves much of what a parabola
+    leaves.
+    """
+    shown = []
+    for low, high in pairwise(edges_m):
+        inside = (dips_m > low + EDGE_M) & (dips_m < high - EDGE_M)
+        if np.count_nonzero(inside) < FEWEST_ROWS:
+            continue
+        x = (dips_m[inside] - low) / (high - low) * 2 - 1
+        value = volumes_m3[inside] / sd_m3[inside]
+        plain, smooth = (
+            _least_chi2(legvander(x, degree) / sd_m3[inside, None], value)
+            for degree in (2, int(DEGREES[-1]) + 1)
+        )
+        gain = plain - smooth
+        shown.append(gain > CLEAR_GAIN and smooth < SMOOTH_SHARE * plain + len(x))
+    return len(shown) > 0 and sum(shown) >= max(2, len(shown) / 2)
+
+
+def _least_chi2(basis, value):
+    q = np.linalg.qr(basis)[0]
+    left = value - q @ (q.T @ value)
+    return float(left @ left)
