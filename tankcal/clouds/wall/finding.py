@@ -80,6 +80,7 @@ def find_cloud_wall(
     some = sample.points()
     surface, ends = find_surface(
         some,
+        outwards=_outwards(sample, sides),
         kind=kind,
         ends_m=None if joints_m is None else (joints_m[0], joints_m[-1]),
         radius_m=radius_m,
@@ -109,6 +110,13 @@ def find_cloud_wall(
     )
     cells = passes.cells(surface, grid, scans)
     return wall_of_cells(cells, joints, tuple(sides or ["one"] * scans))
+
+
+def _outwards(sample, sides):
+    """(k,) 1 of sampled points seen from inside, -1 from outside; None: no sides are known."""
+    if sides is None:
+        return None
+    return np.where(np.array(sides) == "inside", 1, -1)[sample.scans()]
 
 
 def _share_near(xyz_m, surface, ends_m, band_m):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.clouds.wall.growing import EMPTY, FEW, FEWEST, REFINE_BINS, WALL
-from tankcal.clouds.wall.start import FILE
+from tankcal.clouds.wall.screens import FILE, two_surfaces
 from tankcal.errors import InputError, Problem
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
@@ -58,17 +58,8 @@ def refuse_two_surfaces(grown, counts, cells):
     if not all_round and not (grown.surfaces and grown.surfaces[0][0] >= RIVAL):
         return
     first, other = _two_distances(grown, counts, grid)
-    text = message(
-        "cloud_two_surfaces",
-        "found two surfaces where one was expected: {first_m:.3f} m in {first:.0f} % of the cells "
-        "and {second_m:.3f} m in {second:.0f} %: insulation, a double wall, or scans of both sides "
-        "told as one (side)",
-        first_m=cells.surface.radius_m + first,
-        first=100 * np.count_nonzero(wall) / seen,
-        second_m=cells.surface.radius_m + other,
-        second=100 * share,
-    )
-    raise InputError(Problem(FILE, text))
+    radius_m = cells.surface.radius_m
+    raise two_surfaces(radius_m + first, np.count_nonzero(wall) / seen, radius_m + other, share)
 
 
 def _two_distances(grown, counts, grid):
