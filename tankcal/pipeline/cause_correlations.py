@@ -16,6 +16,7 @@ Source: Koch 1999, section 3.2.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtri
 
 from tankcal.geometry.field.blunders import restricted_precision
 from tankcal.geometry.field.components import COMPONENTS
@@ -24,6 +25,8 @@ from tankcal.geometry.field.sites import free_design
 from tankcal.quadrature import panels
 from tankcal.sections import coordinates_of
 
+LEVEL = 0.01  # of the test of a registration: at 0.001 it misses half of those twice too large
+LEAST_SHARE = 0.5  # of a combination of the registration that the wall determines
 IN_SI = {"mm": 1e-3, "ppm": 1e-6}
 
 
@@ -52,6 +55,60 @@ class ToldCause:
     correlation: float
 
 
+@dataclass(frozen=True)
+class RegistrationTest:
+    """Whether a wall agrees with the registration of the scans that show it.
+
+    Attributes
+    ----------
+    chi2 : float
+        Of those combinations of the registration that the wall determines.
+    dof : int
+        Number of these combinations.
+    limit : float
+        Critical value at `LEVEL`.
+    """
+
+    chi2: float
+    dof: int
+    limit: float
+
+    @property
+    def factor(self):
+        """By how much the registration departs from its declared standard deviation (rms)."""
+        return float(np.sqrt(self.chi2 / self.dof))
+
+
+def registration_test(job, wall):
+    """`RegistrationTest` of the scans of a wall; None where the wall does not show their poses.
+
+    All unit variables z of the registration together: z = C' P y has the covariance S = C' P C
+    where the registration is as declared. An eigenvalue of S is the share of a combination that
+    the wall determines. Overlaps show it, and where scans adjoin, the form that the wall has.
+    """
+    causes = [one for one in job.points.causes if one.what == "registration"]
+    if not causes:
+        return None
+    index = coordinates_of(wall.accepted)
+    columns = np.column_stack([wall.radii_by_points @ one.column_m[index] for one in causes])
+    left = wall.field.radius_m - wall.field.radius_m.mean()
+    weighted = _precision(wall) @ np.column_stack([columns, left])
+    share, directions = np.linalg.eigh(columns.T @ weighted[:, :-1])
+    shown = share > LEAST_SHARE
+    if not shown.any():
+        return None
+    values = directions[:, shown].T @ (columns.T @ weighted[:, -1])
+    dof = int(np.count_nonzero(shown))
+    chi2 = float(np.sum(values**2 / share[shown]))
+    return RegistrationTest(chi2, dof, float(chdtri(dof, LEVEL)))
+
+
+def _precision(wall):
+    """(n, n) precision of the radii without the free radii of the courses."""
+    whole = wall.field.covariance_m2 + noise_of_wall(wall) - wall.field.noise_m2
+    return restricted_precision(whole, free_design(wall.field.sites)[0])
+
+
 def told_causes(job, wall):
     """`ToldCause` of each offset and scale of instruments that the points of a wall share.
 
@@ -73,9 +130,7 @@ def told_causes(job, wall):
     left = field.radius_m - field.radius_m.mean()
     index = coordinates_of(wall.accepted)
     for one in bound:
-        if precision is None:
-            whole = field.covariance_m2 + noise - field.noise_m2
-            precision = restricted_precision(whole, free_design(field.sites)[0])
+        precision = _precision(wall) if precision is None else precision
         u = one.u * IN_SI[one.unit]
         column = -(wall.radii_by_points @ one.column_m[index])  # of readings too long by one u
         variance = max(1 - column @ precision @ column, 1e-12)

@@ -15,8 +15,9 @@ from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import told_causes
 from tankcal.pipeline.cloud_bottom import CloudInside, find_inside, with_bottom
 from tankcal.pipeline.cloud_cluster import open_passes
+from tankcal.pipeline.cloud_overlaps import normals_of
 from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
-from tankcal.pipeline.cloud_units import refusal_of_units
+from tankcal.pipeline.cloud_units import is_unit_defined, refusal_of_units
 from tankcal.pipeline.hit_wall import through_wall
 from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.scan import fit_scan
@@ -29,7 +30,6 @@ FILE, TARGETS = "clouds.toml", "scan_targets.csv"
 MOST_READINGS = 1200  # whose full covariance is kept
 FEWEST_MEANS = 5  # of a course: a section has as many points
 FAR_AWAY = 20.0  # radii: no scanner that sees a wall stands further from it
-STEP_M = 1.0  # along the normal of a surface
 IN_PROCESS = Reading()
 
 
@@ -140,7 +140,12 @@ def _wall_of_cells(job, placing, passes, telling):
     }
     try:
         return cells_of_clouds.find_cloud_wall(
-            passes, joints_m=joints, sides=job.clouds.sides, progress=telling.step, **sizes
+            passes,
+            joints_m=joints,
+            sides=job.clouds.sides,
+            progress=telling.step,
+            is_unit_defined=is_unit_defined(placing),
+            **sizes,
         )
     except InputError as refused:
         ends = (joints[0], joints[-1]) if joints else None
@@ -184,13 +189,6 @@ def _as_points(job, clouded, told_m=None):
     _refuse_untold(job, beamed)
     job = replace(job, points=s_transform(beamed.points))
     return job, replace(clouded, beamed=beamed)
-
-
-def normals_of(surface, xyz_m):
-    """(n, 3) unit vectors outwards, square to a surface of cells at places (n, 3)."""
-    u, turn, distance = surface.places(np.array(xyz_m))
-    away = surface.points(u, turn, distance + STEP_M) - surface.points(u, turn, distance)
-    return away / np.linalg.norm(away, axis=1, keepdims=True)
 
 
 def _fingerprint(file):

@@ -25,7 +25,7 @@ from scanned_tanks import (
 import tankcal
 from tankcal.errors import InputError
 from tankcal.pipeline import cloud_wall
-from tankcal.pipeline.cloud_checks import overlaps_of
+from tankcal.pipeline.cloud_overlaps import overlaps_of
 from tankcal.record import record_of
 from tankcal.record.schema import checked
 from tankcal.record.versions import RECORD

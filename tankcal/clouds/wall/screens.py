@@ -14,7 +14,8 @@ from tankcal.messages import message
 
 FILE = "clouds.toml"
 
-AROUND, LEVELS = 72, 24  # coarse cells of a sample
+LEVELS, FEWEST_LEVELS, AROUND = 24, 6, 3  # rows of coarse cells; columns for each row
+POINTS_OF_CELL = 20  # that a coarse cell gets, were they even over the wall
 REACH_M, BIN_M = 2.0, 0.05  # of distances that are looked at, to both sides; their classes
 BAND_M = 0.12  # from a surface: of the wall, as deep as its buckles, with noise
 LEAST_SHARE, FEWEST = 0.15, 3  # of the points of a coarse cell, for a distance that counts
@@ -40,10 +41,10 @@ class CoarseCells:
 
     Attributes
     ----------
-    seen : int
-        Cells with points.
+    seen, levels : int
+        Cells with points, and rows of cells.
     rear_share, wall_share : float
-        Of these, cells with points behind the surface, and with points on it.
+        Of the cells with points, those with points behind the surface, and with points on it.
     cell : ndarray of int, shape (cells,)
         Of `distance_m`.
     distance_m : ndarray, shape (cells,)
@@ -57,13 +58,16 @@ class CoarseCells:
         self.xyz_m, self.outwards, self.ends_m = xyz_m, outwards, ends_m
         self.u, self.turn, self.distance = u, turn, distance
         kept = (u > ends_m[0]) & (u < ends_m[1]) & (np.abs(distance) < REACH_M)
-        row = ((u[kept] - ends_m[0]) / (ends_m[1] - ends_m[0]) * LEVELS).astype(np.int64)
-        column = (turn[kept] * (AROUND / FULL_TURN)).astype(np.int64) % AROUND
+        levels = int(np.sqrt(np.count_nonzero(kept) / POINTS_OF_CELL / AROUND))
+        levels = self.levels = min(max(levels, FEWEST_LEVELS), LEVELS)
+        around = AROUND * levels
+        row = ((u[kept] - ends_m[0]) / (ends_m[1] - ends_m[0]) * levels).astype(np.int64)
+        column = (turn[kept] * (around / FULL_TURN)).astype(np.int64) % around
         bins = int(2 * REACH_M / BIN_M)
         rearwards = distance[kept] * outwards[kept]
         level = ((rearwards + REACH_M) / BIN_M).astype(np.int64).clip(0, bins - 1)
-        cell = np.minimum(row, LEVELS - 1) * AROUND + column
-        count = np.bincount(cell * bins + level, minlength=AROUND * LEVELS * bins)
+        cell = np.minimum(row, levels - 1) * around + column
+        count = np.bincount(cell * bins + level, minlength=around * levels * bins)
         count = count.reshape(-1, bins)
         total = count.sum(axis=1, keepdims=True)
         # a surface may lie on the edge of two classes: both count for either
@@ -88,17 +92,13 @@ class CoarseCells:
 
     def near_rear(self):
         """(n,) points near the leaning circle that most of the rearmost distances support."""
-        design = _design(*_middles(self.cell))
+        row, column = np.divmod(self.cell, AROUND * self.levels)
+        turn = (column + 0.5) * (FULL_TURN / (AROUND * self.levels))
+        design = _design(turn, (row + 0.5) / self.levels)
         model = _consensus(design, self.distance_m, self.side)
         height = (self.u - self.ends_m[0]) / (self.ends_m[1] - self.ends_m[0])
         away = self.distance - _design(self.turn, height) @ model
         return (height > 0) & (height < 1) & (np.abs(away) < BAND_M)
-
-
-def _middles(cell):
-    """Turn and relative height (cells,) of the middles of coarse cells."""
-    row, column = np.divmod(cell, AROUND)
-    return (column + 0.5) * (FULL_TURN / AROUND), (row + 0.5) / LEVELS
 
 
 def _design(turn, height):

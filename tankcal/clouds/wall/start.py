@@ -35,7 +35,9 @@ LEAST_ON_SPHERE = 0.3  # of the points
 SPHERE_TRIES, SPHERE_BANDS = 400, (0.03, 0.02, 0.01, 0.006, 0.006)
 
 
-def find_surface(xyz_m, *, kind, ends_m, radius_m, azimuth_rad=0.0, outwards=None):
+def find_surface(
+    xyz_m, *, kind, ends_m, radius_m, azimuth_rad=0.0, outwards=None, is_unit_defined=False
+):
     """The surface that a sample of points shows, near a nominal radius.
 
     Parameters
@@ -52,6 +54,8 @@ def find_surface(xyz_m, *, kind, ends_m, radius_m, azimuth_rad=0.0, outwards=Non
         Of the axis of a lying cylinder.
     outwards : ndarray of int, shape (n,), optional
         1 of points seen from inside, -1 from outside; None: not known, and no screen is looked for.
+    is_unit_defined : bool, optional
+        As for `find_cloud_wall`.
 
     Returns
     -------
@@ -81,7 +85,8 @@ def find_surface(xyz_m, *, kind, ends_m, radius_m, azimuth_rad=0.0, outwards=Non
         _refuse_radius(surface, radius_m)
         return surface, ends_m_found
     except SolutionError as error:
-        cause = _likely_cause(xyz_m[:DIAGNOSED], kind, ends_m, radius_m, azimuth_rad)
+        units = {} if is_unit_defined else UNITS
+        cause = _likely_cause(xyz_m[:DIAGNOSED], kind, ends_m, radius_m, azimuth_rad, units)
         raise _problem(cause or error.args[0]) from None
 
 
@@ -144,7 +149,8 @@ def _rear_surface(first, ends_m, xyz_m, outwards, radius_m):
     ]
     worst = max(cells, key=lambda one: one.rear_share)
     is_clear = worst.rear_share < REAR_SHARE
-    if is_clear and worst.wall_share > CLEAR_SHARE or not isinstance(first, CylinderSurface):
+    is_cylinder = isinstance(first, CylinderSurface) and len(worst.cell) >= LEAST_SQUARES
+    if is_clear and worst.wall_share > CLEAR_SHARE or not is_cylinder:
         second = None
     else:
         second = _behind(first, ends_m, worst, radius_m)
@@ -287,10 +293,10 @@ def _no_sphere(radius_m, share, band):
     )
 
 
-def _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad):
+def _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad, units):
     """What would explain that no wall is found; None: nothing that was tried."""
     middle = np.median(xyz_m, axis=0)
-    for unit, factor in UNITS.items():
+    for unit, factor in units.items():
         for origin in (np.zeros(3), middle):
             scaled = (xyz_m - origin) / factor + origin
             if shows_wall(scaled, kind, ends_m, radius_m, azimuth_rad):
