@@ -25,7 +25,8 @@ from tankcal.geometry.field.sites import free_design
 from tankcal.quadrature import panels
 from tankcal.sections import coordinates_of
 
-LEVEL = 0.01  # of the test of a registration: at 0.001 it misses half of those twice too large
+REGISTRATION = "registration"  # kind of the causes that are poses
+LEVEL = 0.005  # of a test of a registration; at 0.001 it misses half of those twice too large
 LEAST_SHARE = 0.5  # of a combination of the registration that the wall determines
 IN_SI = {"mm": 1e-3, "ppm": 1e-6}
 
@@ -57,21 +58,23 @@ class ToldCause:
 
 @dataclass(frozen=True)
 class RegistrationTest:
-    """Whether a wall agrees with the registration of the scans that show it.
+    """Whether overlaps, or the form of a wall, agree with the registration of scans.
 
     Attributes
     ----------
     chi2 : float
-        Of those combinations of the registration that the wall determines.
+        Of those combinations of the registration that they determine.
     dof : int
         Number of these combinations.
-    limit : float
-        Critical value at `LEVEL`.
     """
 
     chi2: float
     dof: int
-    limit: float
+
+    @property
+    def limit(self):
+        """Critical value of chi2 at `LEVEL`."""
+        return float(chdtri(self.dof, LEVEL))
 
     @property
     def factor(self):
@@ -79,14 +82,14 @@ class RegistrationTest:
         return float(np.sqrt(self.chi2 / self.dof))
 
 
-def registration_test(job, wall):
+def wall_test(job, wall):
     """`RegistrationTest` of the scans of a wall; None where the wall does not show their poses.
 
     All unit variables z of the registration together: z = C' P y has the covariance S = C' P C
     where the registration is as declared. An eigenvalue of S is the share of a combination that
     the wall determines. Overlaps show it, and where scans adjoin, the form that the wall has.
     """
-    causes = [one for one in job.points.causes if one.what == "registration"]
+    causes = [one for one in job.points.causes if one.what == REGISTRATION]
     if not causes:
         return None
     index = coordinates_of(wall.accepted)
@@ -98,9 +101,7 @@ def registration_test(job, wall):
     if not shown.any():
         return None
     values = directions[:, shown].T @ (columns.T @ weighted[:, -1])
-    dof = int(np.count_nonzero(shown))
-    chi2 = float(np.sum(values**2 / share[shown]))
-    return RegistrationTest(chi2, dof, float(chdtri(dof, LEVEL)))
+    return RegistrationTest(float(np.sum(values**2 / share[shown])), int(np.count_nonzero(shown)))
 
 
 def _precision(wall):

@@ -4,8 +4,9 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
+from tankcal.pipeline.cause_correlations import wall_test
 from tankcal.pipeline.cloud_bottom import check_inside
-from tankcal.pipeline.cloud_overlaps import overlaps_of, scans_apart, registration_test
+from tankcal.pipeline.cloud_overlaps import overlap_test, overlaps_of, scans_apart
 from tankcal.pipeline.cloud_wall import FILE, TARGETS
 from tankcal.pipeline.hit_checks import causes_unlike_certificates
 
@@ -24,7 +25,7 @@ def check_clouds(job, survey, clouded):
     """
     return (
         *_of_targets(clouded.registration),
-        *_of_overlaps(job, clouded),
+        *_of_overlaps(job, survey, clouded),
         *_of_idle_scans(job, clouded),
         *_of_hidden(job, clouded),
         *_of_assumed(job, clouded),
@@ -33,22 +34,32 @@ def check_clouds(job, survey, clouded):
     )
 
 
-def _of_overlaps(job, clouded):
-    apart = [one for one in overlaps_of(job, clouded) if one.is_apart]
+def _of_overlaps(job, survey, clouded):
+    apart = [one for one in overlaps_of(job, clouded.cells, clouded.registration) if one.is_apart]
     for one in apart:
         yield Problem(FILE, scans_apart(job, one))
-    found = None if apart else registration_test(job, clouded)
-    if found is not None and found.is_beyond:
+    if not apart:
+        yield from _of_registration(job, survey, clouded)
+
+
+def _of_registration(job, survey, clouded):
+    """A registration that overlaps, or the form of the wall, show to be worse than declared."""
+    found = [overlap_test(job, clouded.cells, clouded.registration)]
+    if job.tank.kind == "vertical":
+        found.append(wall_test(job, survey))
+    beyond = [one for one in found if one is not None and one.chi2 > one.limit]
+    if beyond:
+        worst = max(beyond, key=lambda one: one.factor)
         text = message(
             "registration_beyond",
-            "where scans overlap they differ {factor:.1f} times as much as their registration and"
-            " their scanners allow (chi2 = {chi2:.1f}, expected at most {limit:.1f} of {dof}):"
-            " U may be too small by this factor; check s_translation_mm, s_rotation_arcsec and the"
-            " targets",
-            factor=found.factor,
-            chi2=found.chi2,
-            limit=found.limit,
-            dof=found.dof,
+            "overlaps and the form of the wall show discrepancies between scans {factor:.1f} times"
+            " as large as the declared registration allows (chi2 = {chi2:.1f}, expected at most"
+            " {limit:.1f} with {dof} degrees of freedom): U may be too small by this factor; check"
+            " poses, s_translation_mm, s_rotation_arcsec and targets",
+            factor=worst.factor,
+            chi2=worst.chi2,
+            limit=worst.limit,
+            dof=worst.dof,
         )
         yield Problem(FILE, text)
 

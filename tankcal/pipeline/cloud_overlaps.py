@@ -9,9 +9,9 @@ from scipy.special import chdtrc, chdtri
 
 from tankcal.adjust import ALPHA
 from tankcal.messages import message
+from tankcal.pipeline.cause_correlations import REGISTRATION, RegistrationTest
 from tankcal.survey.beams import shared_by_beams
 
-REGISTRATION = "registration"  # what causes of poses are
 STEP_M = 1.0  # along the normal of a surface
 FEWEST_CELLS = 20  # in common, before two scans are compared
 MOST_CELLS = 150  # of an overlap that are compared
@@ -20,7 +20,6 @@ STEEP_DEG = 60.0  # of incidence, beyond which no pair of scans is compared
 STEEPEST_DEG = 80.0  # of all scans together: four set-ups outside overlap at 70 degrees and more
 RANK = 0.05  # of the largest direction: a smaller one the overlap does not tell
 MOST_ROWS = 1200  # differences of all overlaps that are tested together
-LEVEL = 0.01  # of that test: at 0.001 it misses a third of registrations twice as bad as declared
 LEAST_TOLD = 1.0  # variance over that of the noise, of a direction that shows the registration
 
 
@@ -48,35 +47,6 @@ class Overlap:
     apart_m: float
     w: float
     is_apart: bool
-
-
-@dataclass(frozen=True)
-class RegistrationTest:
-    """All differences between scans against their registration, as one test.
-
-    Attributes
-    ----------
-    chi2 : float
-        Of the directions in which the registration exceeds the noise.
-    dof : int
-        Number of these directions.
-    limit : float
-        Critical value at `LEVEL`.
-    """
-
-    chi2: float
-    dof: int
-    limit: float
-
-    @property
-    def factor(self):
-        """By how much the differences exceed their standard deviation."""
-        return float(np.sqrt(self.chi2 / self.dof))
-
-    @property
-    def is_beyond(self):
-        """Whether the registration does not explain the differences."""
-        return self.chi2 > self.limit
 
 
 @dataclass(frozen=True)
@@ -128,20 +98,29 @@ class _Differences:
         return shared @ shared.T + np.diag(self.noise_m2)
 
 
-def overlaps_of(job, clouded):
-    """`Overlap` of each pair of scans that show enough cells of the same side in common."""
-    square = [one.some(one.incidence_deg <= STEEP_DEG) for one in _differences(job, clouded)]
+def overlaps_of(job, cells, registration):
+    """`Overlap` of each pair of scans that show enough cells of the same side in common.
+
+    Parameters
+    ----------
+    job : Job
+    cells : CloudWall
+    registration : Registration
+    """
+    square = [
+        one.some(one.incidence_deg <= STEEP_DEG) for one in _differences(job, cells, registration)
+    ]
     return tuple(_overlap(one) for one in square if len(one.apart_m) >= FEWEST_CELLS)
 
 
-def registration_test(job, clouded):
+def overlap_test(job, cells, registration):
     """`RegistrationTest` of all overlaps together; None where no overlap shows the registration.
 
     A pair of scans tests few directions; a registration that is twice as bad as declared shows in
     all of them. The differences are whitened by noise and all that is no registration. Of the
     singular directions of the registration's columns those that exceed the noise are tested.
     """
-    every = _differences(job, clouded)
+    every = _differences(job, cells, registration)
     step = -(-sum(len(one.apart_m) for one in every) // MOST_ROWS)
     if not step:
         return None
@@ -160,10 +139,8 @@ def registration_test(job, clouded):
     if not shown.any():
         return None
     values = directions[:, shown].T @ apart
-    dof = int(np.count_nonzero(shown))
-    return RegistrationTest(
-        float(np.sum(values**2 / (1 + size[shown] ** 2))), dof, float(chdtri(dof, LEVEL))
-    )
+    chi2 = float(np.sum(values**2 / (1 + size[shown] ** 2)))
+    return RegistrationTest(chi2, int(np.count_nonzero(shown)))
 
 
 def scans_apart(job, overlap):
@@ -188,32 +165,30 @@ def normals_of(surface, xyz_m):
     return away / np.linalg.norm(away, axis=1, keepdims=True)
 
 
-def _differences(job, clouded):
+def _differences(job, cells, registration):
     """`_Differences` of each pair of scans that show enough cells of the same side in common."""
-    found, cells = [], clouded.cells
+    found = []
     for pair in combinations(range(len(cells.sides)), 2):
         if cells.sides[pair[0]] != cells.sides[pair[1]]:
             continue
         common = np.argwhere(np.all(cells.is_wall[list(pair)], axis=0))
         if len(common) >= FEWEST_CELLS:
             step = -(-len(common) // MOST_CELLS)
-            one = _differences_of(job, clouded, pair, common[::step], len(common))
+            one = _differences_of(job, cells, registration, pair, common[::step], len(common))
             if one is not None:
                 found.append(one)
     return found
 
 
-def _differences_of(job, clouded, pair, chosen, count):
+def _differences_of(job, cells, registration, pair, chosen, count):
     """`_Differences` of two scans in some cells (n, 2); None: the beams met too few squarely."""
-    cells, surface = clouded.cells, clouded.cells.surface
+    surface = cells.surface
     row, column = chosen.T
     at = cells.along_m[pair[0], row, column], cells.turn_rad[pair[0], row, column]
     radius = np.array([cells.radius_m[scan, row, column] for scan in pair])
     xyz = np.vstack([surface.points(*at, one - surface.radius_m) for one in radius])
     normal, n = normals_of(surface, xyz), len(chosen)
-    shared = shared_by_beams(
-        xyz, np.repeat(pair, n), normal, clouded.registration, job.clouds.tools
-    )
+    shared = shared_by_beams(xyz, np.repeat(pair, n), normal, registration, job.clouds.tools)
     incidence = np.degrees(np.arccos(shared.cosine)).reshape(2, n).max(axis=0)
     steep = incidence > STEEPEST_DEG
     if np.count_nonzero(~steep) < FEWEST_CELLS:
@@ -224,6 +199,7 @@ def _differences_of(job, clouded, pair, chosen, count):
         return (outwards[n:] - outwards[:n])[~steep]
 
     moved = [difference(one) for one in shared.causes if one.what == REGISTRATION]
+    others = [one for one in shared.causes if one.what != REGISTRATION]
     variances = [cells.sd_m[scan, row, column] ** 2 for scan in pair]
     return _Differences(
         pair,
@@ -233,7 +209,7 @@ def _differences_of(job, clouded, pair, chosen, count):
         normal[:n][~steep],
         incidence[~steep],
         np.reshape(moved, (len(moved), -1)).T if moved else np.zeros((n - steep.sum(), 0)),
-        {(one.name, one.what): difference(one) for one in shared.causes if one.what != REGISTRATION},
+        {(one.name, one.what): difference(one) for one in others},
     )
 
 

@@ -15,7 +15,7 @@ from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import told_causes
 from tankcal.pipeline.cloud_bottom import CloudInside, find_inside, with_bottom
 from tankcal.pipeline.cloud_cluster import open_passes
-from tankcal.pipeline.cloud_overlaps import normals_of
+from tankcal.pipeline.cloud_overlaps import normals_of, overlaps_of, scans_apart
 from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
 from tankcal.pipeline.cloud_units import is_unit_defined, refusal_of_units
 from tankcal.pipeline.hit_wall import through_wall
@@ -122,6 +122,7 @@ def points_of_clouds(job, adjustment, progress, reading=IN_PROCESS):
         inside = find_inside(job, passes, found, telling)
     readings = cells_of_clouds.readings_of(found, MOST_READINGS)
     _refuse_empty_courses(job, found, readings)
+    _refuse_scans_apart(job, found, registration)
     job = replace(job, files=(*job.files, *files))
     job = with_bottom(job, inside, registration)
     clouded = Clouded(
@@ -232,6 +233,18 @@ def _refuse_places(job, registration, surface):
                 problems.append(Problem(FILE, text, column=f"{file.name}.side"))
     if problems:
         raise InputError(problems)
+
+
+def _refuse_scans_apart(job, cells, registration):
+    """Raise InputError where scans show two walls that their registration does not bring together.
+
+    Two walls within the registration are one; beyond it either the registration is wrong or a
+    scan shows another surface, and the table could be that of either.
+    """
+    if cells.are_apart:
+        apart = [one for one in overlaps_of(job, cells, registration) if one.is_apart]
+        if apart:
+            raise InputError([Problem(FILE, scans_apart(job, one)) for one in apart])
 
 
 def _refuse_empty_courses(job, found, readings):

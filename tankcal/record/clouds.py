@@ -182,7 +182,7 @@ def clouds_of(result):
                 apart_mm=1000 * one.apart_m,
                 w=one.w,
             )
-            for one in overlaps_of(result.job, clouded)
+            for one in overlaps_of(result.job, clouded.cells, clouded.registration)
         ],
         courses=[
             CourseSeen(course=_course(result.job, place), masked=float(share))

@@ -127,7 +127,7 @@ def test_scans_that_do_not_meet_are_named(tmp_path, few):
     said = [one for one in warnings_of(found) if "apart where both show" in one]
     assert len(said) == 1
     assert "scans 'A' and 'B'" in said[0]
-    (overlap,) = overlaps_of(found.job, found.clouded)
+    (overlap,) = overlaps_of(found.job, found.clouded.cells, found.clouded.registration)
     assert overlap.apart_m == pytest.approx(0.006 / np.sqrt(2), rel=0.1)
 
 

@@ -43,8 +43,8 @@ def refuse_no_wall(grown, cells):
     raise InputError(Problem(FILE, text))
 
 
-def refuse_two_surfaces(grown, counts, cells):
-    """Raise InputError where a second surface goes round with the wall, or rivals it in size.
+def two_surfaces_in(grown, counts, cells):
+    """InputError where a second surface goes round with the wall, or rivals it in size; else None.
 
     counts  (rows, columns, bins) that the wall was grown in
     """
@@ -56,10 +56,10 @@ def refuse_two_surfaces(grown, counts, cells):
     share = np.count_nonzero(second) / seen
     all_round = share >= TWO_SURFACES and np.mean(parts >= TWO_SURFACES) >= SECTORS_WITH
     if not all_round and not (grown.surfaces and grown.surfaces[0][0] >= RIVAL):
-        return
+        return None
     first, other = _two_distances(grown, counts, grid)
     radius_m = cells.surface.radius_m
-    raise two_surfaces(radius_m + first, np.count_nonzero(wall) / seen, radius_m + other, share)
+    return two_surfaces(radius_m + first, np.count_nonzero(wall) / seen, radius_m + other, share)
 
 
 def _two_distances(grown, counts, grid):

@@ -150,7 +150,7 @@ def _rear_surface(first, ends_m, xyz_m, outwards, radius_m):
     worst = max(cells, key=lambda one: one.rear_share)
     is_clear = worst.rear_share < REAR_SHARE
     is_cylinder = isinstance(first, CylinderSurface) and len(worst.cell) >= LEAST_SQUARES
-    if is_clear and worst.wall_share > CLEAR_SHARE or not is_cylinder:
+    if (is_clear and worst.wall_share > CLEAR_SHARE) or not is_cylinder:
         second = None
     else:
         second = _behind(first, ends_m, worst, radius_m)
