@@ -16,7 +16,6 @@ Source: Koch 1999, section 3.2.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
 
 from tankcal.geometry.field.blunders import restricted_precision
 from tankcal.geometry.field.components import COMPONENTS
@@ -25,9 +24,6 @@ from tankcal.geometry.field.sites import free_design
 from tankcal.quadrature import panels
 from tankcal.sections import coordinates_of
 
-REGISTRATION = "registration"  # kind of the causes that are poses
-LEVEL = 0.005  # of a test of a registration; at 0.001 it misses half of those twice too large
-LEAST_SHARE = 0.5  # of a combination of the registration that the wall determines
 IN_SI = {"mm": 1e-3, "ppm": 1e-6}
 
 
@@ -56,60 +52,6 @@ class ToldCause:
     correlation: float
 
 
-@dataclass(frozen=True)
-class RegistrationTest:
-    """Whether overlaps, or the form of a wall, agree with the registration of scans.
-
-    Attributes
-    ----------
-    chi2 : float
-        Of those combinations of the registration that they determine.
-    dof : int
-        Number of these combinations.
-    """
-
-    chi2: float
-    dof: int
-
-    @property
-    def limit(self):
-        """Critical value of chi2 at `LEVEL`."""
-        return float(chdtri(self.dof, LEVEL))
-
-    @property
-    def factor(self):
-        """By how much the registration departs from its declared standard deviation (rms)."""
-        return float(np.sqrt(self.chi2 / self.dof))
-
-
-def wall_test(job, wall):
-    """`RegistrationTest` of the scans of a wall; None where the wall does not show their poses.
-
-    All unit variables z of the registration together: z = C' P y has the covariance S = C' P C
-    where the registration is as declared. An eigenvalue of S is the share of a combination that
-    the wall determines. Overlaps show it, and where scans adjoin, the form that the wall has.
-    """
-    causes = [one for one in job.points.causes if one.what == REGISTRATION]
-    if not causes:
-        return None
-    index = coordinates_of(wall.accepted)
-    columns = np.column_stack([wall.radii_by_points @ one.column_m[index] for one in causes])
-    left = wall.field.radius_m - wall.field.radius_m.mean()
-    weighted = _precision(wall) @ np.column_stack([columns, left])
-    share, directions = np.linalg.eigh(columns.T @ weighted[:, :-1])
-    shown = share > LEAST_SHARE
-    if not shown.any():
-        return None
-    values = directions[:, shown].T @ (columns.T @ weighted[:, -1])
-    return RegistrationTest(float(np.sum(values**2 / share[shown])), int(np.count_nonzero(shown)))
-
-
-def _precision(wall):
-    """(n, n) precision of the radii without the free radii of the courses."""
-    whole = wall.field.covariance_m2 + noise_of_wall(wall) - wall.field.noise_m2
-    return restricted_precision(whole, free_design(wall.field.sites)[0])
-
-
 def told_causes(job, wall):
     """`ToldCause` of each offset and scale of instruments that the points of a wall share.
 
@@ -131,7 +73,9 @@ def told_causes(job, wall):
     left = field.radius_m - field.radius_m.mean()
     index = coordinates_of(wall.accepted)
     for one in bound:
-        precision = _precision(wall) if precision is None else precision
+        if precision is None:
+            whole = field.covariance_m2 + noise - field.noise_m2
+            precision = restricted_precision(whole, free_design(field.sites)[0])
         u = one.u * IN_SI[one.unit]
         column = -(wall.radii_by_points @ one.column_m[index])  # of readings too long by one u
         variance = max(1 - column @ precision @ column, 1e-12)

@@ -4,7 +4,6 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
-from tankcal.pipeline.cause_correlations import wall_test
 from tankcal.pipeline.cloud_bottom import check_inside
 from tankcal.pipeline.cloud_overlaps import overlap_test, overlaps_of, scans_apart
 from tankcal.pipeline.cloud_wall import FILE, TARGETS
@@ -25,7 +24,7 @@ def check_clouds(job, survey, clouded):
     """
     return (
         *_of_targets(clouded.registration),
-        *_of_overlaps(job, survey, clouded),
+        *_of_overlaps(job, clouded),
         *_of_idle_scans(job, clouded),
         *_of_hidden(job, clouded),
         *_of_assumed(job, clouded),
@@ -34,32 +33,28 @@ def check_clouds(job, survey, clouded):
     )
 
 
-def _of_overlaps(job, survey, clouded):
+def _of_overlaps(job, clouded):
     apart = [one for one in overlaps_of(job, clouded.cells, clouded.registration) if one.is_apart]
     for one in apart:
         yield Problem(FILE, scans_apart(job, one))
     if not apart:
-        yield from _of_registration(job, survey, clouded)
+        yield from _of_registration(job, clouded)
 
 
-def _of_registration(job, survey, clouded):
-    """A registration that overlaps, or the form of the wall, show to be worse than declared."""
-    found = [overlap_test(job, clouded.cells, clouded.registration)]
-    if job.tank.kind == "vertical":
-        found.append(wall_test(job, survey))
-    beyond = [one for one in found if one is not None and one.chi2 > one.limit]
-    if beyond:
-        worst = max(beyond, key=lambda one: one.factor)
+def _of_registration(job, clouded):
+    """A registration that all overlaps together show to be worse than declared."""
+    found = overlap_test(job, clouded.cells, clouded.registration)
+    if found is not None and found.chi2 > found.limit:
         text = message(
             "registration_beyond",
-            "overlaps and the form of the wall show discrepancies between scans {factor:.1f} times"
-            " as large as the declared registration allows (chi2 = {chi2:.1f}, expected at most"
-            " {limit:.1f} with {dof} degrees of freedom): U may be too small by this factor; check"
-            " poses, s_translation_mm, s_rotation_arcsec and targets",
-            factor=worst.factor,
-            chi2=worst.chi2,
-            limit=worst.limit,
-            dof=worst.dof,
+            "where scans overlap they differ {factor:.1f} times as much as the declared"
+            " registration allows (chi2 = {chi2:.1f}, expected at most {limit:.1f} with {dof}"
+            " degrees of freedom): U may be too small by this factor; check poses,"
+            " s_translation_mm, s_rotation_arcsec and targets",
+            factor=found.factor,
+            chi2=found.chi2,
+            limit=found.limit,
+            dof=found.dof,
         )
         yield Problem(FILE, text)
 

@@ -9,9 +9,9 @@ from scipy.special import chdtrc, chdtri
 
 from tankcal.adjust import ALPHA
 from tankcal.messages import message
-from tankcal.pipeline.cause_correlations import REGISTRATION, RegistrationTest
 from tankcal.survey.beams import shared_by_beams
 
+REGISTRATION = "registration"  # kind of the causes that are poses
 STEP_M = 1.0  # along the normal of a surface
 FEWEST_CELLS = 20  # in common, before two scans are compared
 MOST_CELLS = 150  # of an overlap that are compared
@@ -20,6 +20,7 @@ STEEP_DEG = 60.0  # of incidence, beyond which no pair of scans is compared
 STEEPEST_DEG = 80.0  # of all scans together: four set-ups outside overlap at 70 degrees and more
 RANK = 0.05  # of the largest direction: a smaller one the overlap does not tell
 MOST_ROWS = 1200  # differences of all overlaps that are tested together
+LEVEL = 0.01  # of that test; at 0.001 it misses a third of registrations twice too large
 LEAST_TOLD = 1.0  # variance over that of the noise, of a direction that shows the registration
 
 
@@ -47,6 +48,32 @@ class Overlap:
     apart_m: float
     w: float
     is_apart: bool
+
+
+@dataclass(frozen=True)
+class RegistrationTest:
+    """All differences between overlapping scans against their registration.
+
+    Attributes
+    ----------
+    chi2 : float
+        Of those combinations of the registration that exceed the noise of the differences.
+    dof : int
+        Number of these combinations.
+    """
+
+    chi2: float
+    dof: int
+
+    @property
+    def limit(self):
+        """Critical value of chi2 at `LEVEL`."""
+        return float(chdtri(self.dof, LEVEL))
+
+    @property
+    def factor(self):
+        """By how much the differences exceed their standard deviation (rms)."""
+        return float(np.sqrt(self.chi2 / self.dof))
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,9 @@ LEAST_SHARE, FEWEST = 0.15, 3  # of the points of a coarse cell, for a distance 
 REAR_SHARE = 0.05  # of the cells: more than nozzles and manholes take up
 LEAST_WALL_SHARE = 0.5  # of the cells: below it the wall cannot be distinguished from its screen
 CLEAR_SHARE, BETTER_SHARE = 0.95, 0.02  # of the cells: no screen is looked for; gain of another fit
+STEP_M = 0.11  # between neighbouring cells: a screen begins with a larger one
+LEAVING_SHARE = 0.4  # of the rows: a wall does not leave the band without a step in so many
+BAND_OF_RADIUS, LEAST_BAND_M = 0.01, 0.02  # of the first fit, narrower than BAND_M in small tanks
 PENALTY = 2  # cells on a surface that one cell behind it outweighs
 SAMPLES, REFITS = 1000, 5  # of five cells each: with half of them of the wall, 30 have no other
 
@@ -43,20 +46,20 @@ class CoarseCells:
     ----------
     seen, levels : int
         Cells with points, and rows of cells.
-    rear_share, wall_share : float
-        Of the cells with points, those with points behind the surface, and with points on it.
+    rear_share, wall_share, leaving_share : float
+        Of the cells with points, those with points behind the surface, and with points on it; of
+        the rows, those in which one surface leads from the band of the wall to beyond it.
     cell : ndarray of int, shape (cells,)
         Of `distance_m`.
     distance_m : ndarray, shape (cells,)
         Rearmost distance of each cell, outwards of the surface, m.
-    rear_m, front_m : ndarray
-        Of these, distances behind the surface, and before it.
     """
 
     def __init__(self, surface, xyz_m, outwards, ends_m):
         u, turn, distance = surface.places(xyz_m)
         self.xyz_m, self.outwards, self.ends_m = xyz_m, outwards, ends_m
         self.u, self.turn, self.distance = u, turn, distance
+        self.radius_m = surface.radius_m
         kept = (u > ends_m[0]) & (u < ends_m[1]) & (np.abs(distance) < REACH_M)
         levels = int(np.sqrt(np.count_nonzero(kept) / POINTS_OF_CELL / AROUND))
         levels = self.levels = min(max(levels, FEWEST_LEVELS), LEVELS)
@@ -86,16 +89,29 @@ class CoarseCells:
         rearmost = bins - 1 - occupied[shown][:, ::-1].argmax(axis=1)
         self.side = 1 if np.mean(outwards) > 0 else -1
         self.distance_m = self.side * middle[rearmost]
-        self.rear_m = self.distance_m[behind[shown]]
-        front = self.side * self.distance_m < -BAND_M
-        self.front_m = self.distance_m[front] if front.any() else self.distance_m
+        self.leaving_share = self._leaving_share()
+
+    @property
+    def is_clear(self):
+        """Whether hardly any cell is behind the surface, and the wall leaves it nowhere."""
+        return self.rear_share < REAR_SHARE and self.leaving_share < LEAVING_SHARE
+
+    def _leaving_share(self):
+        """Share of the rows in which one surface leads from within the band to beyond it."""
+        rows = np.full(AROUND * self.levels**2, np.nan)
+        rows[self.cell] = self.distance_m
+        rows = rows.reshape(self.levels, -1)
+        after = np.roll(rows, -1, axis=1)
+        crosses = (np.abs(rows) < BAND_M) != (np.abs(after) < BAND_M)
+        return float(np.mean(np.any(crosses & (np.abs(after - rows) < STEP_M), axis=1)))
 
     def near_rear(self):
         """(n,) points near the leaning circle that most of the rearmost distances support."""
         row, column = np.divmod(self.cell, AROUND * self.levels)
         turn = (column + 0.5) * (FULL_TURN / (AROUND * self.levels))
         design = _design(turn, (row + 0.5) / self.levels)
-        model = _consensus(design, self.distance_m, self.side)
+        band_m = min(BAND_OF_RADIUS * self.radius_m + LEAST_BAND_M, BAND_M)
+        model = _consensus(design, self.distance_m, self.side, band_m)
         height = (self.u - self.ends_m[0]) / (self.ends_m[1] - self.ends_m[0])
         away = self.distance - _design(self.turn, height) @ model
         return (height > 0) & (height < 1) & (np.abs(away) < BAND_M)
@@ -108,7 +124,7 @@ def _design(turn, height):
     return np.column_stack([np.ones(len(turn)), sine, cosine, h * sine, h * cosine])
 
 
-def _consensus(design, distance_m, side):
+def _consensus(design, distance_m, side, band_m):
     """(5,) radius, shift and lean of a cylinder near many distances and in front of few of them."""
     rng = np.random.default_rng(20_11)
     five = rng.integers(len(distance_m), size=(SAMPLES, 5))
@@ -118,12 +134,12 @@ def _consensus(design, distance_m, side):
         return np.zeros(design.shape[1])
     away = side * (distance_m - models @ design.T)
     # a circle between screen and wall is near many cells of both, but has the wall behind it
-    support = np.count_nonzero(np.abs(away) < BAND_M, axis=1)
-    support -= PENALTY * np.count_nonzero(away >= BAND_M, axis=1)
-    chosen = np.abs(away[np.argmax(support)]) < BAND_M
+    support = np.count_nonzero(np.abs(away) < band_m, axis=1)
+    support -= PENALTY * np.count_nonzero(away >= band_m, axis=1)
+    chosen = np.abs(away[np.argmax(support)]) < band_m
     for _ in range(REFITS):
         model = np.linalg.lstsq(design[chosen], distance_m[chosen])[0]
-        chosen = np.abs(design @ model - distance_m) < BAND_M
+        chosen = np.abs(design @ model - distance_m) < band_m
     return model
 
 
@@ -132,11 +148,24 @@ def two_surfaces(first_m, first, second_m, second):
     text = message(
         "cloud_two_surfaces",
         "found two surfaces where one was expected: {first_m:.3f} m in {first:.0f} % of the cells "
-        "and {second_m:.3f} m in {second:.0f} %: insulation, a double wall, a screen before the "
-        "wall, or scans of both sides told as one (side)",
+        "and {second_m:.3f} m in {second:.0f} %: insulation, a double wall, or scans of both sides "
+        "told as one (side)",
         first_m=first_m,
         first=100 * first,
         second_m=second_m,
         second=100 * second,
+    )
+    return InputError(Problem(FILE, text))
+
+
+def undecided(cells):
+    """InputError for a wall that cannot be distinguished from what hides it in `CoarseCells`."""
+    low, high = np.percentile(cells.distance_m, [5, 95])
+    text = message(
+        "cloud_wall_hidden",
+        "the points lie on surfaces up to about {apart_m:.1f} m apart, and the wall cannot be "
+        "distinguished from a screen before it: expected scans that show more than half of the "
+        "wall; leave the screen out with a box (leave_out), or scan behind it",
+        apart_m=high - low,
     )
     return InputError(Problem(FILE, text))

@@ -12,9 +12,8 @@ from tankcal.clouds.wall.screens import (
     CLEAR_SHARE,
     FILE,
     LEAST_WALL_SHARE,
-    REAR_SHARE,
     CoarseCells,
-    two_surfaces,
+    undecided,
 )
 from tankcal.clouds.wall.surfaces import CylinderSurface, SphereSurface
 from tankcal.errors import InputError, Problem, SolutionError
@@ -141,32 +140,28 @@ def _through(some, joints_m, radius_m, middle, frame):
 def _rear_surface(first, ends_m, xyz_m, outwards, radius_m):
     """The wall where the surface that was found first may be a screen before it.
 
-    Raises InputError for two surfaces of which neither is clearly the wall.
+    Raises InputError for several surfaces of which none is clearly the wall.
     """
     cells = [
         CoarseCells(first, xyz_m[outwards == side], outwards[outwards == side], ends_m)
         for side in np.unique(outwards)
     ]
-    worst = max(cells, key=lambda one: one.rear_share)
-    is_clear = worst.rear_share < REAR_SHARE
+    worst = max(cells, key=lambda one: (not one.is_clear, one.rear_share))
+    is_clear = worst.is_clear
     is_cylinder = isinstance(first, CylinderSurface) and len(worst.cell) >= LEAST_SQUARES
     if (is_clear and worst.wall_share > CLEAR_SHARE) or not is_cylinder:
         second = None
     else:
         second = _behind(first, ends_m, worst, radius_m)
-    if second is None:
-        if is_clear:
-            return first
-        rear_m = first.radius_m + float(np.median(worst.rear_m))
-        raise two_surfaces(first.radius_m, worst.wall_share, rear_m, worst.rear_share)
-    found = CoarseCells(second, worst.xyz_m, worst.outwards, ends_m)
-    if is_clear and found.wall_share < worst.wall_share + BETTER_SHARE:
+    if second is not None:
+        found = CoarseCells(second, worst.xyz_m, worst.outwards, ends_m)
+        is_better = not is_clear or found.wall_share > worst.wall_share + BETTER_SHARE
+        is_wall = found.is_clear and found.wall_share >= LEAST_WALL_SHARE
+        if is_better and is_wall and abs(second.radius_m / radius_m - 1) < WIDE:
+            return second
+    if is_clear:
         return first
-    is_wall = found.rear_share < REAR_SHARE and found.wall_share >= LEAST_WALL_SHARE
-    if is_wall and abs(second.radius_m / radius_m - 1) < WIDE:
-        return second
-    front_m = second.radius_m + float(np.median(found.front_m))
-    raise two_surfaces(second.radius_m, found.wall_share, front_m, 1 - found.wall_share)
+    raise undecided(worst)
 
 
 def _behind(first, ends_m, cells, radius_m):
