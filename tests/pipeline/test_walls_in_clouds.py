@@ -377,7 +377,7 @@ def test_bad_registration_is_warned_of(tmp_path, few, monkeypatch):
 def test_a_format_that_defines_its_unit_has_no_other(tmp_path):
     """Points of a wall in feet: text is asked for its unit, E57 is in metres by its standard."""
     parts = scanned_parts(np.random.default_rng(6), with_tool(TOOL), columns=120, rows=25)
-    expected = {"xyz": "cloud_file_unit", "e57": "cloud_nothing_upright"}
+    expected = {"xyz": "cloud_file_unit", "e57": "no_circle"}
     for ending, code in expected.items():
         folder = write_folder(tmp_path / ending, parts)
         for name in SCANS:
