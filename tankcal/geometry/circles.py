@@ -3,11 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 import scipy.sparse
 
-from tankcal.adjust import adjust
+from tankcal.adjust import Adjustment, adjust
 from tankcal.errors import SolutionError
 from tankcal.messages import message
+
+# of the fit to distances: minimisations, each with new weights; a centre that no longer moves
+MOST_ROUNDS, SETTLED_M, TOLERANCE = 10, 1e-8, 1e-14
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,11 @@ def fit_circle(xy_m, covariance_m2):
     For n even points of standard deviation s: s_centre = s sqrt(2/n), s_radius = s / sqrt(n).
     Source: Silva 1995, program CIRCUM.
 
+    Where a form far above the noise meets a covariance that shifts or turns whole groups of points,
+    the adjusted points may move by decimetres, and the iteration alternates between two circles.
+    The circle is then that of the distances of the measured points from the centre, weighted by
+    their covariance; to first order of the residuals both are the same.
+
     Parameters
     ----------
     xy_m : array_like, shape (n, 2)
@@ -78,7 +87,11 @@ def fit_circle(xy_m, covariance_m2):
     centre = xy_m.mean(axis=0)
     local = xy_m - centre
     model = _conditions_of_points if np.ndim(covariance_m2) == 3 else circle_conditions
-    adjusted = adjust(model, taubin_circle(local), local.ravel(), covariance_m2)
+    start = taubin_circle(local)
+    try:
+        adjusted = adjust(model, start, local.ravel(), covariance_m2)
+    except SolutionError:
+        adjusted = _fit_distances(local, covariance_m2, start)
     x, y, radius = adjusted.unknowns
     return Circle(
         x_m=float(x + centre[0]),
@@ -89,6 +102,56 @@ def fit_circle(xy_m, covariance_m2):
         variance_factor=adjusted.variance_factor,
         dof=adjusted.dof,
     )
+
+
+def _fit_distances(local, covariance_m2, start):
+    """`Adjustment` of x, y and radius to the distances of the measured points from the centre.
+
+    The covariance of the distances is that at the last centre, taken anew after each minimisation.
+    """
+    unknowns = start
+    for _ in range(MOST_ROUNDS):
+        before, spread = unknowns, radial_covariance(local, unknowns[:2], covariance_m2)
+        variances = np.diag(spread) if np.ndim(spread) == 1 else spread
+        # a damped step lowers the sum of squares even where the full step of `adjust` does not
+        lower = scipy.linalg.cholesky(variances, lower=True)
+        unknowns = _damped_circle(local, lower, before)
+        if np.allclose(unknowns, before, rtol=0, atol=SETTLED_M):
+            break
+    misclosure, by_circle, _ = _conditions_of_points(unknowns, local.ravel())
+    whitened, design = (
+        scipy.linalg.solve_triangular(lower, one, lower=True) for one in (misclosure, by_circle)
+    )
+    return Adjustment(
+        unknowns=unknowns,
+        cofactor=np.linalg.inv(design.T @ design),
+        normalised=whitened,
+        chi2=float(whitened @ whitened),
+        rows=len(local),
+        estimated=3,
+        iterations=MOST_ROUNDS,
+    )
+
+
+def _damped_circle(local, lower, start):
+    """Minimise the whitened misclosures of `_conditions_of_points` (Levenberg-Marquardt)."""
+    import scipy.optimize  # loaded where the ordinary iteration fails alone
+
+    def whitened(unknowns, which):
+        given = _conditions_of_points(unknowns, local.ravel())[which]
+        return scipy.linalg.solve_triangular(lower, given, lower=True)
+
+    found = scipy.optimize.least_squares(
+        whitened,
+        start,
+        lambda unknowns, which: whitened(unknowns, which + 1),
+        method="lm",
+        xtol=TOLERANCE,
+        ftol=TOLERANCE,
+        gtol=TOLERANCE,
+        args=(0,),
+    )
+    return found.x
 
 
 def circle_by_points(circle, xy_m, covariance_m2):

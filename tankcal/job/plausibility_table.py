@@ -408,6 +408,14 @@ TABLE = (
         verified=False,
     ),
     Plausible(
+        "clouds.toml: s_translation_mm, s_rotation_arcsec",
+        "pairs of scans no further apart than these and the scanners allow (0.1 %), all overlaps"
+        " together as well (1 %)",
+        "a scan that moved, a registration worse than declared",
+        "the overlaps of the scans",
+        ("scans_apart", "registration_beyond"),
+    ),
+    Plausible(
         "liquid.flow_m3_h",
         "within the range that the meter was proved for",
         "litres per minute, a valve hardly open",

@@ -1,51 +1,16 @@
 """Warnings of clouds: scans that do not meet, walls that are hidden, and what nobody declared."""
 
-from dataclasses import dataclass
-
 import numpy as np
-from scipy.special import chdtrc, chdtri
 
-from tankcal.adjust import ALPHA
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.cloud_bottom import check_inside
-from tankcal.pipeline.cloud_wall import FILE, TARGETS, normals_of
+from tankcal.pipeline.cloud_overlaps import overlap_test, overlaps_of, scans_apart
+from tankcal.pipeline.cloud_wall import FILE, TARGETS
 from tankcal.pipeline.hit_checks import causes_unlike_certificates
-from tankcal.survey.beams import points_of_beams
 
 HIDDEN = 0.25  # of the cells of a course: what lies behind is a guess of the form alone
 LEAST_OF_WALL = 0.01  # of the points of a scan
-FEWEST_CELLS = 20  # in common, before two scans are compared
-MOST_CELLS = 150  # of an overlap that are compared
-LEAST_M = 2e-4  # cells of two scans may differ so much without a reason that a scan knows
-STEEP_DEG = 60.0  # of incidence, beyond which cells are not compared
-RANK = 0.05  # of the largest direction: a smaller one the overlap does not tell
-
-
-@dataclass(frozen=True)
-class Overlap:
-    """Two scans where both show the wall.
-
-    Attributes
-    ----------
-    scans : tuple of int
-    cells : int
-    mean_m : float
-        By how much the second has the wall further out.
-    apart_m : float
-        Root mean square of what a shift between them explains of their differences.
-    w : float
-        Of that against registration, offset and incidence: as |w| of one reading.
-    is_apart : bool
-        Whether the registration does not explain it.
-    """
-
-    scans: tuple
-    cells: int
-    mean_m: float
-    apart_m: float
-    w: float
-    is_apart: bool
 
 
 def check_clouds(job, survey, clouded):
@@ -68,84 +33,30 @@ def check_clouds(job, survey, clouded):
     )
 
 
-def overlaps_of(job, clouded):
-    """`Overlap` of each pair of scans that show enough cells of the same side in common."""
-    found, cells = [], clouded.cells
-    for a in range(len(cells.sides)):
-        for b in range(a + 1, len(cells.sides)):
-            if cells.sides[a] == cells.sides[b]:
-                common = np.argwhere(cells.is_wall[a] & cells.is_wall[b])
-                if len(common) >= FEWEST_CELLS:
-                    step = -(-len(common) // MOST_CELLS)
-                    one = _overlap(job, clouded, (a, b), common[::step], len(common))
-                    if one is not None:
-                        found.append(one)
-    return tuple(found)
-
-
-def _overlap(job, clouded, pair, chosen, count):
-    """`Overlap` of two scans by the differences of their cells, with all that these share.
-
-    Differences d = e . (shift of the one against the other, and a constant) + noise, e the normal.
-    """
-    cells, surface = clouded.cells, clouded.cells.surface
-    row, column = chosen.T
-    places, sds = [], []
-    for scan in pair:
-        radius = cells.radius_m[scan, row, column]
-        at = cells.along_m[pair[0], row, column], cells.turn_rad[pair[0], row, column]
-        places.append(surface.points(*at, radius - surface.radius_m))
-        sds.append(cells.sd_m[scan, row, column])
-    xyz, n = np.vstack(places), len(chosen)
-    normal = normals_of(surface, xyz)
-    beamed = points_of_beams(
-        xyz,
-        np.concatenate(sds),
-        np.repeat(pair, n),
-        normal,
-        clouded.registration,
-        job.clouds.tools,
-    )
-    steep = np.degrees(beamed.incidence_rad).reshape(2, n).max(axis=0) > STEEP_DEG
-    if np.count_nonzero(~steep) < FEWEST_CELLS:
-        return None
-    outwards = np.zeros((2 * n, 6 * n))  # distance outwards of each by all coordinates
-    for axis in range(3):
-        outwards[np.arange(2 * n), 3 * np.arange(2 * n) + axis] = normal[:, axis]
-    minus = np.hstack([-np.eye(n), np.eye(n)])[~steep] @ outwards
-    apart = (cells.radius_m[pair[1], row, column] - cells.radius_m[pair[0], row, column])[~steep]
-    covariance = minus @ beamed.points.covariance_m2 @ minus.T
-    design = np.column_stack([normal[:n][~steep], np.ones(n - steep.sum())])
-    u, size, _ = np.linalg.svd(design, full_matrices=False)
-    told = u[:, size > RANK * size[0]]
-    values = told.T @ apart
-    spread = told.T @ covariance @ told + len(apart) * LEAST_M**2 * np.eye(told.shape[1])
-    test = float(values @ np.linalg.solve(spread, values))
-    return Overlap(
-        pair,
-        count,
-        float(apart.mean()),
-        float(np.sqrt(values @ values / len(apart))),
-        float(np.sqrt(chdtri(1, max(chdtrc(told.shape[1], test), 1e-300)))),
-        test > chdtri(told.shape[1], ALPHA),
-    )
-
-
 def _of_overlaps(job, clouded):
-    for one in overlaps_of(job, clouded):
-        if one.is_apart:
-            names = [job.clouds.scans[scan].name for scan in one.scans]
-            text = message(
-                "scans_apart",
-                "scans {one!r} and {other!r} are {apart_mm:.1f} mm apart where both show the wall"
-                " (|w| = {w:.1f}), more than their registration and their scanners allow: did one"
-                " move, or is a standard deviation too small?",
-                one=names[0],
-                other=names[1],
-                apart_mm=1000 * one.apart_m,
-                w=one.w,
-            )
-            yield Problem(FILE, text)
+    apart = [one for one in overlaps_of(job, clouded.cells, clouded.registration) if one.is_apart]
+    for one in apart:
+        yield Problem(FILE, scans_apart(job, one))
+    if not apart:
+        yield from _of_registration(job, clouded)
+
+
+def _of_registration(job, clouded):
+    """A registration that all overlaps together show to be worse than declared."""
+    found = overlap_test(job, clouded.cells, clouded.registration)
+    if found is not None and found.chi2 > found.limit:
+        text = message(
+            "registration_beyond",
+            "where scans overlap they differ {factor:.1f} times as much as the declared"
+            " registration allows (chi2 = {chi2:.1f}, expected at most {limit:.1f} with {dof}"
+            " degrees of freedom): U may be too small by this factor; check poses,"
+            " s_translation_mm, s_rotation_arcsec and targets",
+            factor=found.factor,
+            chi2=found.chi2,
+            limit=found.limit,
+            dof=found.dof,
+        )
+        yield Problem(FILE, text)
 
 
 def _of_targets(registration):

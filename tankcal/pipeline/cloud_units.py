@@ -12,14 +12,17 @@ from tankcal.messages import message
 
 FILE = "clouds.toml"
 SAMPLE, MOST_CHUNKS = 60_000, 8  # of a file: points that are looked at, pieces that are read
+DEFINED = {"e57": "m"}  # unit that a format defines, by ASTM E2807 for E57: no other is guessed
+SHOWN = ("cloud_too_sparse", "cloud_two_surfaces")  # refusals of walls that were found
 SAME = 1e-3  # of two units that points do not tell apart: feet and survey feet
 
 
 def refusal_of_units(placing, sizes, refused):
     """The error that no wall was found, or one that names the files in another unit.
 
-    A file is looked at by itself: each of its scans is as large as that unit makes it, about the
-    scanner where its pose comes from targets, about the origin where it comes from the file.
+    Each file is examined alone: each of its scans is as large as that unit makes it, about the
+    scanner where its pose comes from targets, about the origin where it comes from the file. A
+    format that defines its unit has no other, and a wall that was found has the right unit.
 
     Parameters
     ----------
@@ -33,9 +36,14 @@ def refusal_of_units(placing, sizes, refused):
     InputError
     """
     problems = []
+    if any(one.expected.code in SHOWN for one in refused.problems):
+        return refused
     for number, file in enumerate(placing.files):
+        units = units_of(file)
+        if len(units) == 1 and file.unit_m in units.values():
+            continue
         scan, xyz = _some_points(placing, number)
-        unit = _unit_that_fits(xyz, placing.place_m[scan], file.unit_m, sizes)
+        unit = _unit_that_fits(xyz, placing.place_m[scan], file.unit_m, units, sizes)
         if unit is not None:
             declared = next(name for name, size in UNITS_M.items() if size == file.unit_m)
             text = message(
@@ -49,6 +57,17 @@ def refusal_of_units(placing, sizes, refused):
             )
             problems.append(Problem(FILE, text, column=f"{file.name}.unit"))
     return InputError(problems) if problems else refused
+
+
+def units_of(file):
+    """{unit: metres} that the coordinates of a `CloudFile` may be in."""
+    defined = DEFINED.get(file.header.format)
+    return UNITS_M if defined is None else {defined: UNITS_M[defined]}
+
+
+def is_unit_defined(placing):
+    """Whether all files have the unit that their format defines."""
+    return all(list(units_of(one).values()) == [one.unit_m] for one in placing.files)
 
 
 def _some_points(placing, number):
@@ -66,10 +85,10 @@ def _some_points(placing, number):
     return first or 0, sample.points()
 
 
-def _unit_that_fits(xyz_m, place_m, declared_m, sizes):
+def _unit_that_fits(xyz_m, place_m, declared_m, units, sizes):
     """Name of a unit with which the points show a wall; None: of no other."""
     tried = [declared_m]
-    for unit, size in UNITS_M.items():
+    for unit, size in units.items():
         factor = size / declared_m
         if any(abs(size / one - 1) < SAME for one in tried):
             continue

@@ -15,8 +15,9 @@ from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import told_causes
 from tankcal.pipeline.cloud_bottom import CloudInside, find_inside, with_bottom
 from tankcal.pipeline.cloud_cluster import open_passes
+from tankcal.pipeline.cloud_overlaps import normals_of, overlaps_of, scans_apart
 from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
-from tankcal.pipeline.cloud_units import refusal_of_units
+from tankcal.pipeline.cloud_units import is_unit_defined, refusal_of_units
 from tankcal.pipeline.hit_wall import through_wall
 from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.scan import fit_scan
@@ -29,7 +30,6 @@ FILE, TARGETS = "clouds.toml", "scan_targets.csv"
 MOST_READINGS = 1200  # whose full covariance is kept
 FEWEST_MEANS = 5  # of a course: a section has as many points
 FAR_AWAY = 20.0  # radii: no scanner that sees a wall stands further from it
-STEP_M = 1.0  # along the normal of a surface
 IN_PROCESS = Reading()
 
 
@@ -122,6 +122,7 @@ def points_of_clouds(job, adjustment, progress, reading=IN_PROCESS):
         inside = find_inside(job, passes, found, telling)
     readings = cells_of_clouds.readings_of(found, MOST_READINGS)
     _refuse_empty_courses(job, found, readings)
+    _refuse_scans_apart(job, found, registration)
     job = replace(job, files=(*job.files, *files))
     job = with_bottom(job, inside, registration)
     clouded = Clouded(
@@ -140,7 +141,12 @@ def _wall_of_cells(job, placing, passes, telling):
     }
     try:
         return cells_of_clouds.find_cloud_wall(
-            passes, joints_m=joints, sides=job.clouds.sides, progress=telling.step, **sizes
+            passes,
+            joints_m=joints,
+            sides=job.clouds.sides,
+            progress=telling.step,
+            is_unit_defined=is_unit_defined(placing),
+            **sizes,
         )
     except InputError as refused:
         ends = (joints[0], joints[-1]) if joints else None
@@ -186,13 +192,6 @@ def _as_points(job, clouded, told_m=None):
     return job, replace(clouded, beamed=beamed)
 
 
-def normals_of(surface, xyz_m):
-    """(n, 3) unit vectors outwards, square to a surface of cells at places (n, 3)."""
-    u, turn, distance = surface.places(np.array(xyz_m))
-    away = surface.points(u, turn, distance + STEP_M) - surface.points(u, turn, distance)
-    return away / np.linalg.norm(away, axis=1, keepdims=True)
-
-
 def _fingerprint(file):
     """`InputFile` of a file of a scanner, whose content is never held whole."""
     try:
@@ -234,6 +233,18 @@ def _refuse_places(job, registration, surface):
                 problems.append(Problem(FILE, text, column=f"{file.name}.side"))
     if problems:
         raise InputError(problems)
+
+
+def _refuse_scans_apart(job, cells, registration):
+    """Raise InputError where scans show two walls that their registration does not bring together.
+
+    Two walls within the registration are one; beyond it either the registration is wrong or a
+    scan shows another surface, and the table could be that of either.
+    """
+    if cells.are_apart:
+        apart = [one for one in overlaps_of(job, cells, registration) if one.is_apart]
+        if apart:
+            raise InputError([Problem(FILE, scans_apart(job, one)) for one in apart])
 
 
 def _refuse_empty_courses(job, found, readings):

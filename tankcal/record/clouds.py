@@ -163,7 +163,7 @@ def clouds_of(result):
     clouded, clouds = result.clouded, result.job.clouds
     if clouded is None:
         return None
-    from tankcal.pipeline.cloud_checks import overlaps_of
+    from tankcal.pipeline.cloud_overlaps import overlaps_of
 
     certificates = {name: tool.certificate for name, tool in clouds.ranging.items()}
     return CloudsRecord(
@@ -182,7 +182,7 @@ def clouds_of(result):
                 apart_mm=1000 * one.apart_m,
                 w=one.w,
             )
-            for one in overlaps_of(result.job, clouded)
+            for one in overlaps_of(result.job, clouded.cells, clouded.registration)
         ],
         courses=[
             CourseSeen(course=_course(result.job, place), masked=float(share))

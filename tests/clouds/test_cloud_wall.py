@@ -450,3 +450,24 @@ def test_buckle_is_no_weld(size):  # simulation: rays; seams of this scene are t
     scan, _ = take_scan(np.random.default_rng(1), scene, (0.5, -0.3, 3.0), RAYS, even=False)
     wall = find_cloud_wall(passes_of([scan]), radius_m=4.0, joints_m=scene.joints_m)
     assert not wall.welds
+
+
+@pytest.mark.slow
+def test_scans_that_do_not_meet_are_decided_one_by_one():  # closed form: one is 60 mm off
+    moved = _cylinder(160_000, seed=2) + [0.06, 0.0, 0.0]
+    wall = _find(_cylinder(160_000), moved, sides=("inside", "inside"))
+    assert wall.are_apart
+    for scan, middle in enumerate(([10.0, 20.0], [10.06, 20.0])):
+        kept = wall.is_wall[scan]
+        off = wall.radius_m[scan][kept] - wall.surface.radius_m
+        places = wall.along_m[scan][kept], wall.turn_rad[scan][kept], off
+        away = np.hypot(*(wall.surface.points(*places)[:, :2] - middle).T)
+        assert kept.mean() > 0.9
+        assert_allclose(np.median(away), 3.0, atol=5e-4)
+
+
+@pytest.mark.slow
+def test_two_surfaces_of_one_of_two_scans_are_refused():  # closed form
+    with pytest.raises(InputError) as raised:
+        _find(_cylinder(160_000, seed=2), _leaved(0.5), sides=("inside", "inside"))
+    assert raised.value.problems[0].expected.code == "cloud_two_surfaces"

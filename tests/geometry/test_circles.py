@@ -10,8 +10,14 @@ import scipy.optimize
 import scipy.sparse
 from shapes import azimuths, ring
 
+from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
-from tankcal.geometry.circles import fit_circle, radial_covariance
+from tankcal.geometry.circles import (
+    circle_conditions,
+    fit_circle,
+    radial_covariance,
+    taubin_circle,
+)
 
 S_VARIANCE_M2 = 2.0e-4  # published: S table 11, coordinate variance
 
@@ -108,3 +114,51 @@ def test_independent_points_are_fitted_as_with_their_whole_covariance():
         assert found.variance_factor == pytest.approx(other.variance_factor, rel=1e-9)
     radial = radial_covariance(points, (0.1, 0.2), whole)
     assert radial_covariance(points, (0.1, 0.2), each) == pytest.approx(np.diag(radial), rel=1e-12)
+
+
+def _seen_from_outside(form_m, set_ups=4, away_m=10.0, radius_m=5.0, count=80):
+    """Points of a section with waves, and a covariance whose set-ups shift by 5 mm and turn."""
+    azimuth = azimuths(count)
+    waves = sum(form_m / k * np.cos(k * azimuth + k * k) for k in (2, 3, 4))
+    xy = (radius_m + waves)[:, None] * np.column_stack([np.sin(azimuth), np.cos(azimuth)])
+    columns = []
+    for at in azimuths(set_ups):
+        mine = np.abs((azimuth - at + np.pi) % (2 * np.pi) - np.pi) <= np.pi / set_ups
+        away = xy - (radius_m + away_m) * np.array([np.sin(at), np.cos(at)])
+        turned = np.column_stack([-away[:, 1], away[:, 0]])
+        for by in (np.tile([5e-3, 0], (count, 1)), np.tile([0, 5e-3], (count, 1)), 1e-3 * turned):
+            columns.append((by * mine[:, None]).ravel())
+    columns = np.column_stack(columns)
+    return xy, columns @ columns.T + 1e-8 * np.eye(2 * count)
+
+
+def test_waves_under_shared_errors_have_a_circle():
+    """The iteration at adjusted points alternates; second method: a search without derivatives."""
+    xy, covariance = _seen_from_outside(0.15)
+    with pytest.raises(SolutionError, match="converge"):
+        adjust(circle_conditions, taubin_circle(xy), xy.ravel(), covariance)
+    circle = fit_circle(xy, covariance)
+    weight = np.linalg.inv(radial_covariance(xy, (circle.x_m, circle.y_m), covariance))
+
+    def squares(given):
+        off = np.hypot(*(xy - given[:2]).T) - given[2]
+        return off @ weight @ off
+
+    start, options = taubin_circle(xy), {"xatol": 1e-9, "fatol": 1e-9, "maxiter": 4000}
+    found = scipy.optimize.minimize(squares, start, method="Nelder-Mead", options=options).x
+    np.testing.assert_allclose([circle.x_m, circle.y_m, circle.radius_m], found, atol=1e-5)
+
+
+def test_fit_of_distances_is_that_of_points_to_first_order(monkeypatch):
+    """Property: small waves have the same circle and covariance by both iterations."""
+    xy, covariance = _seen_from_outside(0.001)
+    points = fit_circle(xy, covariance)
+
+    def fail(*_):
+        raise SolutionError("")
+
+    monkeypatch.setattr("tankcal.geometry.circles.adjust", fail)
+    distances = fit_circle(xy, covariance)
+    np.testing.assert_allclose(distances.radius_m, points.radius_m, atol=1e-6)
+    np.testing.assert_allclose(distances.cofactor_m2, points.cofactor_m2, rtol=0.01, atol=1e-9)
+    assert distances.dof == points.dof

@@ -21,11 +21,13 @@ from scanned_tanks import (
     scanned_parts,
     xyz_text,
 )
+from scipy.spatial.transform import Rotation
+from written_clouds import write_cloud
 
 import tankcal
 from tankcal.errors import InputError
-from tankcal.pipeline import cloud_wall
-from tankcal.pipeline.cloud_checks import overlaps_of
+from tankcal.pipeline import cloud_checks, cloud_wall
+from tankcal.pipeline.cloud_overlaps import RegistrationTest, overlap_test, overlaps_of
 from tankcal.record import record_of
 from tankcal.record.schema import checked
 from tankcal.record.versions import RECORD
@@ -127,7 +129,7 @@ def test_scans_that_do_not_meet_are_named(tmp_path, few):
     said = [one for one in warnings_of(found) if "apart where both show" in one]
     assert len(said) == 1
     assert "scans 'A' and 'B'" in said[0]
-    (overlap,) = overlaps_of(found.job, found.clouded)
+    (overlap,) = overlaps_of(found.job, found.clouded.cells, found.clouded.registration)
     assert overlap.apart_m == pytest.approx(0.006 / np.sqrt(2), rel=0.1)
 
 
@@ -323,3 +325,66 @@ def test_narrow_seams_and_a_buckle_of_a_cloud_are_in_its_table(tmp_path, figure)
     off, expanded = 1e6 * (top.value_m3 / truth - 1), 1e6 * top.U_m3 / truth
     figure("seams and a buckle in a cloud: ppm off, U", f"{off:.1f} {expanded:.1f}")
     assert abs(off) < expanded
+
+
+CORNERS = ((0.9, 0.8), (-0.9, 0.8), (-0.8, -0.9), (0.8, -0.8))
+
+
+def _registered_badly(folder, seed, factor):
+    """`RegistrationTest` of four scans whose poses are `factor` times as bad as declared."""
+    rng = np.random.default_rng(seed)
+    scans = {f"S{i}": ScannerAt((*at, 1.6), tool=TOOL) for i, at in enumerate(CORNERS)}
+    parts = scanned_parts(rng, scans, targets=False, columns=240, rows=40)
+    for name, at in scans.items():
+        pose = np.eye(4)
+        pose[:3, :3] = Rotation.from_rotvec(factor * rng.normal(0, 10 / 206265, 3)).as_matrix()
+        pose[:3, 3] = at.place_m + factor * rng.normal(0, 1e-3, 3)
+        given = parts.registers["clouds"][name]
+        given |= {"pose": pose.tolist(), "s_translation_mm": 1.0, "s_rotation_arcsec": 10.0}
+    job = tankcal.load(write_folder(folder, parts))
+    job, clouded = cloud_wall.points_of_clouds(job, None, lambda _: None)
+    return overlap_test(job, clouded.cells, clouded.registration)
+
+
+@pytest.mark.slow
+def test_registration_worse_than_declared_is_found(tmp_path):
+    """Simulation: the mean of chi2 over its degrees of freedom is the square of the factor."""
+    found = {1: [], 3: []}
+    for factor, tests in found.items():
+        for seed in range(3):
+            folder = tmp_path / f"{factor}-{seed}"
+            tests.append(_registered_badly(folder, seed, factor))
+    assert min(one.dof for one in found[1]) >= 6
+    ratio = {k: np.mean([one.factor**2 for one in tests]) for k, tests in found.items()}
+    assert 0.3 < ratio[1] < 2.0
+    assert ratio[3] == pytest.approx(9 * ratio[1], rel=0.35)
+    assert sum(one.chi2 > one.limit for one in found[3]) >= 2
+    assert not any(one.chi2 > one.limit for one in found[1])
+
+
+@pytest.mark.slow
+def test_bad_registration_is_warned_of(tmp_path, few, monkeypatch):
+    """Property: the warning names the factor; no pair of scans shows it."""
+    monkeypatch.setattr(cloud_checks, "overlaps_of", lambda *_: ())
+    monkeypatch.setattr(cloud_checks, "overlap_test", lambda *_: RegistrationTest(48.0, 12))
+    parts = scanned_parts(np.random.default_rng(5), with_tool(TOOL), columns=240, rows=40)
+    found = tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)), simulated=False)
+    (text,) = [one for one in warnings_of(found) if "where scans overlap" in one]
+    assert "differ 2.0 times as much" in text
+    assert "expected at most 26.2 with 12 degrees of freedom" in text
+
+
+def test_a_format_that_defines_its_unit_has_no_other(tmp_path):
+    """Points of a wall in feet: text is asked for its unit, E57 is in metres by its standard."""
+    parts = scanned_parts(np.random.default_rng(6), with_tool(TOOL), columns=120, rows=25)
+    expected = {"xyz": "cloud_file_unit", "e57": "no_circle"}
+    for ending, code in expected.items():
+        folder = write_folder(tmp_path / ending, parts)
+        for name in SCANS:
+            own = np.loadtxt(folder / f"{name}.xyz")
+            write_cloud(folder / f"{name}.{ending}", own / 0.3048)
+        text = (folder / "clouds.toml").read_text(encoding="utf-8")
+        (folder / "clouds.toml").write_text(text.replace(".xyz", f".{ending}"), encoding="utf-8")
+        with pytest.raises(InputError) as refused:
+            tankcal.run(tankcal.load(folder))
+        assert {one.expected.code for one in refused.value.problems} == {code}

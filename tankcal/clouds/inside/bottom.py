@@ -26,7 +26,7 @@ from tankcal.clouds.wall.growing import (
     spread_between,
 )
 from tankcal.clouds.wall.passes import Passes
-from tankcal.clouds.wall.start import FILE
+from tankcal.clouds.wall.screens import FILE
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 

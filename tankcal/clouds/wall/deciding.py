@@ -3,7 +3,7 @@
 All scans of one side decide together what is wall; the distance of it is then told for each scan.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from tankcal.clouds.wall.features import (
     find_welds,
 )
 from tankcal.clouds.wall.growing import OFF_TREND, WALL, grow_wall, off_trend
-from tankcal.clouds.wall.refusals import refuse_no_wall, refuse_two_surfaces
+from tankcal.clouds.wall.refusals import refuse_no_wall, two_surfaces_in
+from tankcal.errors import InputError
 from tankcal.geometry.outlines import FULL_TURN
 
 LEAST_SD_M = 5e-5  # no mean of a cell is told better
@@ -57,6 +58,8 @@ class CloudWall:
         What was found, as proposals.
     delivered, outside, beyond, of_wall : ndarray of int, shape (scans,)
         Points that came; beside the shell; near it, but not in the band; averaged in cells of wall.
+    are_apart : bool
+        Whether scans show the wall at distances so different that each was decided alone.
     """
 
     surface: object
@@ -79,6 +82,7 @@ class CloudWall:
     outside: np.ndarray
     beyond: np.ndarray
     of_wall: np.ndarray
+    are_apart: bool = False
 
 
 def wall_of_cells(cells, joints_m, sides):
@@ -125,6 +129,7 @@ def wall_of_cells(cells, joints_m, sides):
         outside=cells.outside,
         beyond=cells.beyond,
         of_wall=count.sum(axis=(1, 2)),
+        are_apart=found.are_apart,
     )
 
 
@@ -137,6 +142,7 @@ class _Found:
         self.radius, self.sd, self.turn, self.along = np.full((4, *shape), np.nan)
         self.count, self.is_wall = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=bool)
         self.scatter = np.full(cells.scans, np.nan)
+        self.are_apart = False
 
     def decide(self, mine, joints_m, column_m):
         """`Grown` of the scans of one side; their means are filled in."""
@@ -150,7 +156,9 @@ class _Found:
             joined_rows=np.searchsorted(grid.edges_m, joints_m[1:-1] - 1e-9),
         )
         refuse_no_wall(grown, cells)
-        refuse_two_surfaces(grown, total, cells)
+        second = two_surfaces_in(grown, total, cells)
+        if second is not None:
+            return self._apart(mine, joints_m, column_m, grown, second)
         for i in mine:
             mean, self.sd[i], self.count[i] = _means(cells, i, grown)
             self.radius[i] = cells.surface.radius_m + mean
@@ -166,6 +174,24 @@ class _Found:
             least = max(LEAST_SD_M, self.scatter[i])
             self.sd[i] = np.maximum(self.sd[i], least)
         return grown
+
+    def _apart(self, mine, joints_m, column_m, grown, second):
+        """`Grown` where two surfaces are one wall in scans that do not meet; else raise `second`.
+
+        Each scan then decides alone. It must show a single surface itself: a wall with another
+        surface before a part of it has two in the scan that sees both.
+        """
+        if len(mine) == 1:
+            raise second
+        why = grown.why.copy()
+        for one in mine:
+            try:
+                alone = self.decide([one], joints_m, column_m)
+            except InputError:
+                raise second from None
+            why[alone.why == WALL] = WALL
+        self.are_apart = True
+        return replace(grown, why=why)
 
 
 def _middles(grid):

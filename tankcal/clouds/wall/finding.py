@@ -36,6 +36,7 @@ def find_cloud_wall(
     row_m=ROW_M,
     memory_bytes=MEMORY_BYTES,
     progress=None,
+    is_unit_defined=False,
 ):
     """The wall that the points of scans show.
 
@@ -63,6 +64,8 @@ def find_cloud_wall(
         That the sums may take.
     progress : callable, optional
         Is told what is being done.
+    is_unit_defined : bool, optional
+        Whether the format of the files defines their unit, so that no other unit is suggested.
 
     Returns
     -------
@@ -80,6 +83,8 @@ def find_cloud_wall(
     some = sample.points()
     surface, ends = find_surface(
         some,
+        outwards=_outwards(sample, sides),
+        is_unit_defined=is_unit_defined,
         kind=kind,
         ends_m=None if joints_m is None else (joints_m[0], joints_m[-1]),
         radius_m=radius_m,
@@ -109,6 +114,13 @@ def find_cloud_wall(
     )
     cells = passes.cells(surface, grid, scans)
     return wall_of_cells(cells, joints, tuple(sides or ["one"] * scans))
+
+
+def _outwards(sample, sides):
+    """(k,) 1 of sampled points seen from inside, -1 from outside; None: no sides are known."""
+    if sides is None:
+        return None
+    return np.where(np.array(sides) == "inside", 1, -1)[sample.scans()]
 
 
 def _share_near(xyz_m, surface, ends_m, band_m):

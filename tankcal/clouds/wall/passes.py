@@ -12,7 +12,7 @@ import numpy as np
 
 from tankcal.clouds.wall.cells import WallCells
 from tankcal.clouds.wall.sampling import PointSample
-from tankcal.clouds.wall.start import FILE
+from tankcal.clouds.wall.screens import FILE
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.clouds.wall.growing import EMPTY, FEW, FEWEST, REFINE_BINS, WALL
-from tankcal.clouds.wall.start import FILE
+from tankcal.clouds.wall.screens import FILE, two_surfaces
 from tankcal.errors import InputError, Problem
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
@@ -43,8 +43,8 @@ def refuse_no_wall(grown, cells):
     raise InputError(Problem(FILE, text))
 
 
-def refuse_two_surfaces(grown, counts, cells):
-    """Raise InputError where a second surface goes round with the wall, or rivals it in size.
+def two_surfaces_in(grown, counts, cells):
+    """InputError where a second surface goes round with the wall, or rivals it in size; else None.
 
     counts  (rows, columns, bins) that the wall was grown in
     """
@@ -56,19 +56,10 @@ def refuse_two_surfaces(grown, counts, cells):
     share = np.count_nonzero(second) / seen
     all_round = share >= TWO_SURFACES and np.mean(parts >= TWO_SURFACES) >= SECTORS_WITH
     if not all_round and not (grown.surfaces and grown.surfaces[0][0] >= RIVAL):
-        return
+        return None
     first, other = _two_distances(grown, counts, grid)
-    text = message(
-        "cloud_two_surfaces",
-        "found two surfaces where one was expected: {first_m:.3f} m in {first:.0f} % of the cells "
-        "and {second_m:.3f} m in {second:.0f} %: insulation, a double wall, or scans of both sides "
-        "told as one (side)",
-        first_m=cells.surface.radius_m + first,
-        first=100 * np.count_nonzero(wall) / seen,
-        second_m=cells.surface.radius_m + other,
-        second=100 * share,
-    )
-    raise InputError(Problem(FILE, text))
+    radius_m = cells.surface.radius_m
+    return two_surfaces(radius_m + first, np.count_nonzero(wall) / seen, radius_m + other, share)
 
 
 def _two_distances(grown, counts, grid):

@@ -22,6 +22,7 @@ class PointSample:
     def __init__(self, most):
         self.most, self.delivered = most, {}
         self._xyz, self._key = [np.empty((0, 3))], [np.empty(0, dtype=np.uint64)]
+        self._scan = [np.empty(0, dtype=np.int64)]
         self._waiting, self._limit = 0, np.uint64(2**64 - 1)
 
     def add(self, xyz_m, scan):
@@ -33,6 +34,7 @@ class PointSample:
             taken = np.flatnonzero(key <= self._limit)
             self._xyz.append(part[taken])
             self._key.append(key[taken])
+            self._scan.append(np.full(len(taken), scan, dtype=np.int64))
             self._waiting += len(taken)
             if self._waiting > self.most:
                 self.reduce()
@@ -41,6 +43,7 @@ class PointSample:
         """The sample of the points of both."""
         both = PointSample(self.most)
         both._xyz, both._key = self._xyz + other._xyz, self._key + other._key
+        both._scan = self._scan + other._scan
         both.delivered = {
             scan: self.delivered.get(scan, 0) + other.delivered.get(scan, 0)
             for scan in self.delivered | other.delivered
@@ -49,18 +52,27 @@ class PointSample:
 
     def points(self):
         """(k, 3) points, in the order of their numbers."""
-        self.reduce()
-        order = np.lexsort((*self._xyz[0].T, self._key[0]))
+        order = self._order()
         return self._xyz[0][order]
+
+    def scans(self):
+        """(k,) scan of each of the points."""
+        order = self._order()
+        return self._scan[0][order]
+
+    def _order(self):
+        """(k,) order of the numbers, after the reduction."""
+        self.reduce()
+        return np.lexsort((*self._xyz[0].T, self._key[0]))
 
     def reduce(self):
         """Let go of points that are not in the sample."""
-        xyz, key = np.vstack(self._xyz), np.concatenate(self._key)
+        xyz, key, scan = np.vstack(self._xyz), *map(np.concatenate, (self._key, self._scan))
         if len(key) > self.most:
             best = np.argpartition(key, self.most - 1)[: self.most]
-            xyz, key = xyz[best], key[best]
+            xyz, key, scan = xyz[best], key[best], scan[best]
             self._limit = key.max()
-        self._xyz, self._key, self._waiting = [xyz], [key], 0
+        self._xyz, self._key, self._scan, self._waiting = [xyz], [key], [scan], 0
 
 
 def _hash(xyz_m, scan):

@@ -7,6 +7,14 @@ axis. A lying cylinder is turned upright for it.
 
 import numpy as np
 
+from tankcal.clouds.wall.screens import (
+    BETTER_SHARE,
+    CLEAR_SHARE,
+    FILE,
+    LEAST_WALL_SHARE,
+    CoarseCells,
+    undecided,
+)
 from tankcal.clouds.wall.surfaces import CylinderSurface, SphereSurface
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.geometry.outlines import FULL_TURN
@@ -22,12 +30,13 @@ AROUND, FITTED_LEVELS = 72, 24  # cells of the points that the axis is fitted to
 WIDE = 0.03  # of the radius: how far from the first circle points may be of the wall
 FEWEST = 500  # points between the ends of the shell
 UNITS = {"mm": 1000.0, "cm": 100.0, "ft": 1 / 0.3048, "in": 1 / 0.0254}
-FILE = "clouds.toml"
 LEAST_ON_SPHERE = 0.3  # of the points
 SPHERE_TRIES, SPHERE_BANDS = 400, (0.03, 0.02, 0.01, 0.006, 0.006)
 
 
-def find_surface(xyz_m, *, kind, ends_m, radius_m, azimuth_rad=0.0):
+def find_surface(
+    xyz_m, *, kind, ends_m, radius_m, azimuth_rad=0.0, outwards=None, is_unit_defined=False
+):
     """The surface that a sample of points shows, near a nominal radius.
 
     Parameters
@@ -42,6 +51,10 @@ def find_surface(xyz_m, *, kind, ends_m, radius_m, azimuth_rad=0.0):
         Nominal, on the side that the scans saw.
     azimuth_rad : float, optional
         Of the axis of a lying cylinder.
+    outwards : ndarray of int, shape (n,), optional
+        1 of points seen from inside, -1 from outside; None: not known, and no screen is looked for.
+    is_unit_defined : bool, optional
+        As for `find_cloud_wall`.
 
     Returns
     -------
@@ -65,9 +78,14 @@ def find_surface(xyz_m, *, kind, ends_m, radius_m, azimuth_rad=0.0):
             )
         )
     try:
-        return _surface(xyz_m, kind, ends_m, radius_m, azimuth_rad)
+        surface, ends_m_found = _surface(xyz_m, kind, ends_m, radius_m, azimuth_rad)
+        if outwards is not None and not (kind == "horizontal" and np.any(outwards < 0)):
+            surface = _rear_surface(surface, ends_m_found, xyz_m, outwards, radius_m)
+        _refuse_radius(surface, radius_m)
+        return surface, ends_m_found
     except SolutionError as error:
-        cause = _likely_cause(xyz_m[:DIAGNOSED], kind, ends_m, radius_m, azimuth_rad)
+        units = {} if is_unit_defined else UNITS
+        cause = _likely_cause(xyz_m[:DIAGNOSED], kind, ends_m, radius_m, azimuth_rad, units)
         raise _problem(cause or error.args[0]) from None
 
 
@@ -103,8 +121,12 @@ def _standing(xyz_m, ends_m, radius_m, frame):
     x, y, r = consensus_circle(squares, radius_m)
     distance = np.hypot(local[:, 0] - x, local[:, 1] - y) - r
     near = local[np.abs(distance) < WIDE * radius_m]
-    some = _spread(near, x, y, joints)
-    shell = find_shell(some, joints, radius_m, snooping=False)
+    return _through(_spread(near, x, y, joints), joints, radius_m, middle, frame)
+
+
+def _through(some, joints_m, radius_m, middle, frame):
+    """`CylinderSurface` through points (k, 3) of a wall, about a middle in a frame."""
+    shell = find_shell(some, joints_m, radius_m, snooping=False)
     axis = np.array([*shell.axis_m, shell.z_m])
     found = CylinderSurface(axis, 0.0, shell.slope)
     return CylinderSurface(
@@ -112,6 +134,61 @@ def _standing(xyz_m, ends_m, radius_m, frame):
         float(np.median(found.places(some[shell.reason == ""])[2])),
         shell.slope,
         frame,
+    )
+
+
+def _rear_surface(first, ends_m, xyz_m, outwards, radius_m):
+    """The wall where the surface that was found first may be a screen before it.
+
+    Raises InputError for several surfaces of which none is clearly the wall.
+    """
+    cells = [
+        CoarseCells(first, xyz_m[outwards == side], outwards[outwards == side], ends_m)
+        for side in np.unique(outwards)
+    ]
+    worst = max(cells, key=lambda one: (not one.is_clear, one.rear_share))
+    is_clear = worst.is_clear
+    is_cylinder = isinstance(first, CylinderSurface) and len(worst.cell) >= LEAST_SQUARES
+    if (is_clear and worst.wall_share > CLEAR_SHARE) or not is_cylinder:
+        second = None
+    else:
+        second = _behind(first, ends_m, worst, radius_m)
+    if second is not None:
+        found = CoarseCells(second, worst.xyz_m, worst.outwards, ends_m)
+        is_better = not is_clear or found.wall_share > worst.wall_share + BETTER_SHARE
+        is_wall = found.is_clear and found.wall_share >= LEAST_WALL_SHARE
+        if is_better and is_wall and abs(second.radius_m / radius_m - 1) < WIDE:
+            return second
+    if is_clear:
+        return first
+    raise undecided(worst)
+
+
+def _behind(first, ends_m, cells, radius_m):
+    """`CylinderSurface` through the rearmost distances of coarse cells; None: they show none."""
+    middle = np.array([*(first.frame @ first.centre_m)[:2], (ends_m[0] + ends_m[1]) / 2])
+    near = cells.xyz_m[cells.near_rear()] @ first.frame.T - middle
+    joints = np.array(ends_m) - middle[2]
+    try:
+        some = _spread(near, 0.0, 0.0, joints)
+        return _through(some, joints, radius_m, middle, first.frame)
+    except SolutionError:
+        return None
+
+
+def _refuse_radius(surface, radius_m):
+    """Raise SolutionError where the wall departs from its nominal radius by more than 3 %."""
+    if abs(surface.radius_m / radius_m - 1) > WIDE:
+        raise SolutionError(_other_radius(radius_m, surface.radius_m))
+
+
+def _other_radius(nominal_m, found_m):
+    return message(
+        "cloud_of_other_radius",
+        "no wall near the nominal radius {nominal_m:.3f} m, but one of {radius_m:.3f} m: check "
+        "nominal_diameter_m, the unit and the file",
+        nominal_m=nominal_m,
+        radius_m=found_m,
     )
 
 
@@ -211,10 +288,10 @@ def _no_sphere(radius_m, share, band):
     )
 
 
-def _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad):
+def _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad, units):
     """What would explain that no wall is found; None: nothing that was tried."""
     middle = np.median(xyz_m, axis=0)
-    for unit, factor in UNITS.items():
+    for unit, factor in units.items():
         for origin in (np.zeros(3), middle):
             scaled = (xyz_m - origin) / factor + origin
             if shows_wall(scaled, kind, ends_m, radius_m, azimuth_rad):
@@ -248,13 +325,7 @@ def _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad):
             found, _ = _surface(xyz_m, kind, ends_m, other, azimuth_rad)
         except SolutionError:
             continue
-        return message(
-            "cloud_of_other_radius",
-            "no wall near the nominal radius {nominal_m:.3f} m, but one of {radius_m:.3f} m: check "
-            "nominal_diameter_m, the unit and the file",
-            nominal_m=radius_m,
-            radius_m=found.radius_m,
-        )
+        return _other_radius(radius_m, found.radius_m)
     return None
 
 
