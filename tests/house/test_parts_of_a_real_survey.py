@@ -126,7 +126,15 @@ def test_a_station_less_is_within_u(survey, whole, figure):
 
 def test_the_bulge_is_the_same_in_all_courses(survey, zeta, figure):
     """The excess at mid course does not fall upwards, as a rest of the widening by filling does."""
-    excess, covariance = _excess_at_middle(survey, zeta)
+    for height, places in (
+        ("quarters", (-0.5, 0.5)),
+        ("fifths", (-0.6, 0.6)),
+        ("5 %", (-0.9, 0.9)),
+    ):
+        excess, covariance = _excess_at(places, survey, zeta)
+        figure(f"excess at the {height}, mean and its sd, mm",
+               f"{excess.mean():+.2f} {np.sqrt(covariance.mean()):.2f}")  # fmt: skip
+    excess, covariance = _excess_at((0.0,), survey, zeta)
     courses = np.arange(len(excess)) - (len(excess) - 1) / 2
     mean = excess.mean(), np.sqrt(covariance.mean())
     weights = np.linalg.inv(covariance)
@@ -139,8 +147,8 @@ def test_the_bulge_is_the_same_in_all_courses(survey, zeta, figure):
     assert slope[0] + 2 * mean[0] / len(excess) > 3 * slope[1]  # by filling it is 0 at the top
 
 
-def _excess_at_middle(survey, zeta, waves=24):
-    """(courses,) radius at mid course less the mean of the course, mm; its covariance.
+def _excess_at(places, survey, zeta, waves=24):
+    """(courses,) mean radius at heights of a course less that of the course, mm; its covariance.
 
     Robust least squares of radii: Legendre orders 0 to 4 of each course, waves up the whole shell.
     """
@@ -167,7 +175,8 @@ def _excess_at_middle(survey, zeta, waves=24):
         axis = axis + found[:4]
     normal = (design * weight[:, None]).T @ (design * weight[:, None])
     noise = np.sum((weight * miss) ** 2) / (len(x) - len(normal))
-    at_middle = np.kron(np.eye(len(joints) - 1), [0, 0, -0.5, 0, 3 / 8])  # P2(0), P4(0)
+    there = legvander(np.array(places), 4).mean(axis=0) - np.eye(5)[0]  # less order 0, the mean
+    of_courses = np.kron(np.eye(len(joints) - 1), there)
     first = len(normal) - own.shape[1]
     covariance = noise * np.linalg.inv(normal)[first:, first:]
-    return 1e3 * at_middle @ found[first:], 1e6 * at_middle @ covariance @ at_middle.T
+    return 1e3 * of_courses @ found[first:], 1e6 * of_courses @ covariance @ of_courses.T
