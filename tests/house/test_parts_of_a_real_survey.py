@@ -143,6 +143,8 @@ def test_the_bulge_is_the_same_in_all_courses(survey, zeta, figure):
     slope = (cofactor @ by.T @ weights @ excess)[1], np.sqrt(cofactor[1, 1])
     figure("excess at mid course, mean and its sd, mm", "{:+.2f} {:.2f}".format(*mean))
     figure("its slope, mm a course, and its sd", "{:+.3f} {:.3f}".format(*slope))
+    about = excess - np.sum(weights @ excess) / np.sum(weights)
+    figure("chi-squared of the courses about their mean", f"{about @ weights @ about:.1f}")
     assert mean[0] > 5 * mean[1]
     assert slope[0] + 2 * mean[0] / len(excess) > 3 * slope[1]  # by filling it is 0 at the top
 

@@ -1,17 +1,21 @@
 """By how much do a few heights of a course miss its mean area? Evidence for docs/uncertainty.md.
 
-Exact areas of generated shells, without a survey. The sign depends on the kind of shell, so no mean
-is taken off; these tests fail where the documented signs and sizes no longer follow.
+The sign depends on the kind of shell, so no mean is taken off; these tests fail where the
+documented signs and sizes no longer follow.
 """
 
+import generated_walls
 import numpy as np
 import pytest
 from draws import draws
-from generated_walls import make_wall
+from generated_walls import job_of, make_wall, survey
 from independent_shells import make_shell
 from numpy.polynomial.legendre import leggauss
+from test_coverage_of_walls import ROWS, judged
 
 from tankcal.geometry.field.components import COMPONENTS
+from tankcal.pipeline.tanks import body_of
+from tankcal.pipeline.wall import find_wall
 
 HEIGHTS = {"middle": (0.5,), "quarters": (0.25, 0.75), "fifths": (0.2, 0.8), "joints": (0.05, 0.95)}
 INDEPENDENT = ("settled", "flat-plates", "filled")
@@ -60,6 +64,29 @@ def test_the_bias_at_few_heights_depends_on_the_kind_of_shell_study(figure):
     assert middle["buckle"].mean() < 0
     for family, those in middle.items():  # all smaller than the prior mean, which is 1.58 mm
         assert those.mean() < 0.7 * _prior_mean_mm(), family
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("family", INDEPENDENT)
+def test_a_correction_by_the_prior_mean_is_too_large_study(tmp_path, monkeypatch, figure, family):
+    """Surveys of one ring at mid course: corrected, the rms error is larger than before."""
+    monkeypatch.setitem(generated_walls.RINGS, 1, ((0.5,),))
+    found = []
+    for seed in range(draws(8, 60)):
+        rng = np.random.default_rng([99, seed])
+        shell = make_shell(rng, family)
+        points = int(rng.choice([12, 24, 36]))
+        measured = survey(rng, shell, rings=1, points=points, noise_m=1e-3)
+        job = job_of(shell, measured, tmp_path / "job")
+        body = body_of(job, find_wall(job, lambda text: None))
+        off = judged(shell, body, family, 1).error[ROWS - 1]
+        found.append([off, off - 2e-3 * _prior_mean_mm() / shell.radius_m])
+    mean, rms = 1e6 * np.mean(found, axis=0), 1e6 * np.sqrt(np.mean(np.square(found), axis=0))
+    for name, place in (("uncorrected", 0), ("corrected by the prior mean", 1)):
+        figure(f"one ring at mid course, {family}, {name}: mean, rms, ppm",
+               f"{mean[place]:+.0f} {rms[place]:.0f}")  # fmt: skip
+    assert rms[1] > rms[0]
+    assert abs(mean[1]) > abs(mean[0])
 
 
 def _prior_mean_mm():
