@@ -8,6 +8,7 @@ tank, warm as it is, hold that mass.
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from job_builder import write_folder
@@ -32,10 +33,11 @@ class Fault:
     place: int = 0
 
 
-def metered_job(kind, folder, *, dips, runs=2, registers=None, **settings):
+def metered_job(kind, folder, *, dips, runs=2, registers=None, rest_h=12.0, **settings):
     """A job of one of `metered_tanks.KINDS` whose runs all have the same dips; volumes are blank.
 
-    dips of a run, None first: from empty
+    dips    of a run, None first: from empty; a dip twice: at rest between
+    rest_h  hours between two such dips, h
     """
     parts = metered_parts(kind, **settings)
     nominal = NOMINAL[kind]
@@ -45,8 +47,12 @@ def metered_job(kind, folder, *, dips, runs=2, registers=None, **settings):
             dips, np.round(np.diff(nominal(np.array(dips, dtype=float))), 3), f"run {run + 1}"
         )
     start = np.datetime64("2026-05-04T06:00")
-    for number, row in enumerate(rows):
-        row[8] = str(start + np.timedelta64(30 * number, "m"))
+    rows[0][8] = str(start)
+    for before, row in pairwise(rows):
+        is_rest = row[0] == before[0] and row[2] == 0
+        minutes = round(60 * rest_h) if is_rest else 30
+        row[8] = str(np.datetime64(before[8]) + np.timedelta64(minutes, "m"))
+        row[9] = "rest" if is_rest else None
     parts.tables["liquid"] = [list(HEADINGS), *rows]
     parts.registers["meters"]["M"] |= {"factor_after": None} | (registers or {})
     meter = parts.registers["meters"]["M"]
@@ -84,8 +90,8 @@ def fill(rng, job, volume_of, top_m, fault=None, *, meter_c=26.0, tank_c=20.0):
         for number, row in enumerate(rows):
             warm_in, warm = meter_c + 2 * rng.normal(), tank_c + 0.5 * rng.normal()
             if number:
-                sd = np.hypot(meter.repeatability * volume[row], meter.fixed_m3)
-                shown = max(aimed[row] - aimed[rows[number - 1]], 0.01)
+                sd = np.hypot(meter.repeatability * volume[row], meter.fixed_m3 * bool(volume[row]))
+                shown = max(aimed[row] - aimed[rows[number - 1]], 0.01) * bool(volume[row])
                 if fault.kind == "batch" and row == fault.place:
                     mass += density(warm_in) * shown * factor
                 volume[row] = round(shown / factor, 4)

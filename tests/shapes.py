@@ -30,7 +30,7 @@ def modes(radius, first, cosines, sines):
     return outline, np.pi * radius**2 + np.pi / 2 * (cosines @ cosines + sines @ sines)
 
 
-def section_of(xyz, z=0.0, course=0, variance=1e-6, form_m2=0.0):
+def section_of(xyz, z=0.0, course=0, variance=1e-6, form_m2=1e-2):
     """A section fitted through points with one variance for every coordinate."""
     group = sections.Group("1", course, z, np.arange(len(xyz)))
     covariance = variance * np.eye(3 * len(xyz))

@@ -250,11 +250,16 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
     The form is the same at all heights but for a part that grows linearly with height; its modes,
     the slope and what is `Uneven` are unknowns with a prior (an observation of zero). Without
     `form` the shell is round. sd (n,) of the radii.
+
+    Azimuths of the form are those about `axis`, so that the form is linear: about an axis that
+    moves in the adjustment, high modes of a deep form make Gauss-Newton swing without end.
+    Distances are square to the axis as it leans at first: its ellipse is known, but is no
+    observation of the slope, else the ovality of a single ring would be taken for a lean.
     """
+    lean = np.array(axis[2:4], dtype=float)
     courses, row_of = np.unique(course, return_inverse=True)
     n, modes = len(xyz), 0 if form is None else 2 * (MODES - 1)
     first_mode = 4 + len(courses)
-    height = _relative_height(xyz)
     by_radius = np.zeros((n, len(courses)))
     by_radius[np.arange(n), row_of] = -1.0
     by_uneven = np.zeros((n, 0)) if uneven is None else uneven.columns
@@ -264,14 +269,14 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
     priors[2 * modes : 2 * modes + 2, 2:4] = np.eye(2)
     priors[2 * modes + 2 :, last_mode:] = np.eye(more)
 
+    by_form = np.zeros((n, 0))
+    if modes:
+        by_form = _form_columns(distances_from_axis(xyz, axis)[0], _relative_height(xyz))
+
     def model(x, observations):
-        offset, distance = distances_from_axis(xyz, x[:4])
-        sin, cos = offset[:, 0] / distance, offset[:, 1] / distance
-        turn, by_form = np.zeros(n), np.zeros((n, 2 * modes))
-        if modes:
-            by_form = _form_columns(offset, height)
-            turn = by_form @ _turned(x[first_mode:last_mode]) / distance
-        by_xy = -np.column_stack([sin - turn * cos, cos + turn * sin])
+        offset = _offsets(xyz, x[:4])
+        distance, along = _square_to(offset, lean)
+        by_xy = -(offset - np.outer(along, lean)) / distance[:, None]  # d(distance) / d(offset)
         by_axis = np.hstack([by_xy, by_xy * xyz[:, 2:]])
         top = np.hstack([by_axis, by_radius, -by_form, -by_uneven])
         misclosure = _misclosure(distance, row_of, by_form, by_uneven, x)
@@ -297,15 +302,6 @@ def _form_columns(offset, height):
     return np.hstack([waves, waves * height[:, None]])
 
 
-def _turned(form):
-    """Coefficients of the derivative by the azimuth of a form, whose columns are `_form_columns`.
-
-    c cos k a + s sin k a becomes k s cos k a - k c sin k a.
-    """
-    order = np.tile(np.arange(2, MODES + 1), 2)
-    return np.column_stack([order * form[1::2], -order * form[::2]]).ravel()
-
-
 def _misclosure(distance, row_of, by_form, by_uneven, x):
     """(n,) distances less the radius of the course, the form, and what is uneven."""
     first_mode, more = len(x) - by_form.shape[1] - by_uneven.shape[1], by_uneven.shape[1]
@@ -314,6 +310,42 @@ def _misclosure(distance, row_of, by_form, by_uneven, x):
 
 
 def distances_from_axis(local, axis):
-    """Horizontal offsets (n, 2) and distances (n,) from the axis at each point's own height."""
-    offset = local[:, :2] - axis[:2] - local[:, 2:] * axis[2:4]
-    return offset, np.hypot(offset[:, 0], offset[:, 1])
+    """Horizontal offsets and distances of points from a leaning axis.
+
+    The offset is horizontal, at the point's own height. The distance is square to the axis: that of
+    a cylinder is the same all round, whereas its horizontal cut is an ellipse.
+
+        rho^2 = |o|^2 - (o . s)^2 / (1 + s . s),    o the offset, s the slope of the axis
+
+    Parameters
+    ----------
+    local : ndarray, shape (n, 3)
+        Points, m.
+    axis : array_like, shape (4,)
+        x and y of the axis at z = 0, m, and its slopes dx/dz and dy/dz.
+
+    Returns
+    -------
+    offset : ndarray, shape (n, 2)
+    distance : ndarray, shape (n,)
+        m.
+
+    Examples
+    --------
+    >>> offset, distance = distances_from_axis(np.array([[1.25, 0.0, 0.0]]), [0, 0, 0.75, 0])
+    >>> offset.tolist(), distance.tolist()
+    ([[1.25, 0.0]], [1.0])
+    """
+    offset = _offsets(local, axis)
+    return offset, _square_to(offset, np.asarray(axis[2:4], dtype=float))[0]
+
+
+def _offsets(local, axis):
+    """(n, 2) horizontal offsets of points from the axis at their own height."""
+    return local[:, :2] - axis[:2] - local[:, 2:] * axis[2:4]
+
+
+def _square_to(offset, slope):
+    """Distances (n,) square to an axis, and heights (n,) of their feet above the points."""
+    along = offset @ slope / (1 + slope @ slope)
+    return np.sqrt(np.sum(offset**2, axis=1) - along * (offset @ slope)), along

@@ -2,14 +2,15 @@
 
 import numpy as np
 
-from tankcal.geometry.field.components import COMPONENTS, mode_shares, weld_columns
+from tankcal.geometry.field.components import COMPONENTS, Heights, mode_shares, weld_columns
+from tankcal.geometry.field.sites import spans_of
 from tankcal.geometry.girth import draw_waves, modes_of, nodes_of
 from tankcal.geometry.outlines import FULL_TURN
 
 NOTHING = 1e-12  # of the largest variance over the height: rounding
 
 
-def draw_departures(rng, sizes_m2, zeta, welds_rad, nominal_m):
+def draw_departures(rng, sizes_m2, zeta, welds_rad, nominal_m, spans=None):
     """Departures of the courses of a wall from a cylinder, without a free radius or a centre.
 
     Parameters
@@ -23,6 +24,8 @@ def draw_departures(rng, sizes_m2, zeta, welds_rad, nominal_m):
         Of each course, from the bottom up: the azimuths of its vertical welds that are known.
     nominal_m : float
         Radius of the tank, m.
+    spans : ndarray, shape (courses, 2), optional
+        As `Sites` have them.
 
     Returns
     -------
@@ -40,22 +43,27 @@ def draw_departures(rng, sizes_m2, zeta, welds_rad, nominal_m):
     count, courses = nodes_of(nominal_m), len(welds_rad)
     azimuth = np.arange(count) * FULL_TURN / count
     peaks = [weld_columns(azimuth, np.array(one, dtype=float), nominal_m).T for one in welds_rad]
+    low, high = np.transpose(spans_of(np.arange(courses + 1.0)) if spans is None else spans)
+    heights = [Heights(zeta, low[i] + (zeta + 1) / 2 * (high[i] - low[i])) for i in range(courses)]
     found = np.zeros((courses, len(zeta), count))
     for one, size in zip(COMPONENTS, sizes_m2, strict=True):
         if not size:
             continue
         draws = 1 if one.common else courses
         if one.shape == "weld":  # the same at all heights of a course
-            heights = [rng.normal(size=1 if one.common else len(columns)) for columns in peaks]
+            sizes = [rng.normal(size=1 if one.common else len(columns)) for columns in peaks]
             for course, columns in enumerate(peaks):
-                drawn = np.broadcast_to(heights[0 if one.common else course], len(columns))
+                drawn = np.broadcast_to(sizes[0 if one.common else course], len(columns))
                 found[course] += np.sqrt(size) * (drawn @ columns)
             continue
-        up = np.sqrt(size) * _root(one.height_covariance(zeta, zeta))
-        if one.shape == "mean":
-            around = rng.normal(size=(draws, up.shape[1], 1))
+        if one.shape == "settled":  # its height is that above the foot of the shell
+            up = np.sqrt(size) * np.array([one.height_columns(each) for each in heights])
         else:
-            around = draw_waves(rng, shares[one.shape], (draws, up.shape[1]))
+            up = np.sqrt(size) * _root(one.height_covariance(heights[0], heights[0]))
+        if one.shape == "mean":
+            around = rng.normal(size=(draws, up.shape[-1], 1))
+        else:
+            around = draw_waves(rng, shares[one.shape], (draws, up.shape[-1]))
         found += up @ around
     return found
 

@@ -18,7 +18,13 @@ from functools import cache
 import numpy as np
 import scipy.linalg
 
-from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, mode_shares
+from tankcal.geometry.field.components import (
+    COMPONENTS,
+    ROUND_SHAPES,
+    Heights,
+    azimuth_correlations,
+    mode_shares,
+)
 from tankcal.geometry.outlines import FULL_TURN
 
 SHORTEST_WAVE_M = 0.2  # along the arc: plates do not bend more sharply
@@ -26,6 +32,7 @@ DRAWS, NODES_OF_WAVE = 64, 8  # walls drawn, and nodes of an outline in its shor
 TANGENTS, REACH = 128, 8  # of each wall, and the part of a turn to either side that they may touch
 FREE_M, LEAST_M = 1.0, 1e-6  # sd of radius and centre of a ring beforehand; of its readings, least
 MOST_RINGS = 8  # asked what a wall looks like
+LEVELS = np.array([0.0, 0.5, 1.0])  # parts of the shell's height at which hulls are measured
 
 
 @cache
@@ -86,11 +93,14 @@ class Ring:
     ----------
     azimuth_rad, radius_m : ndarray, shape (n,)
     noise_m2 : ndarray, shape (n, n)
+    up : float
+        Height of the ring above the foot of the shell, as a part of the shell's height.
     """
 
     azimuth_rad: np.ndarray
     radius_m: np.ndarray
     noise_m2: np.ndarray
+    up: float = 0.5
 
 
 def seen_excess(amplitudes, radius_m, rings):
@@ -135,15 +145,16 @@ def seen_excess(amplitudes, radius_m, rings):
     """
     modes = modes_of(radius_m)
     spectra, rng, found = mode_shares(modes, radius_m), np.random.default_rng(0), []
-    nodes = nodes_of(radius_m)
-    turn = FULL_TURN * np.arange(nodes) / nodes
-    chosen = np.unique(np.linspace(0, len(rings) - 1, MOST_RINGS).astype(int))
-    known = [_Known(rings[i], turn, radius_m) for i in chosen]
-    for number, sizes in enumerate(_drawn_sizes(amplitudes, rng)):
+    nodes, known = nodes_of(radius_m), _known_rings(rings, radius_m)
+    for number, drawn in enumerate(_drawn_variances(amplitudes, rng)):
+        here = known[number % len(known)]
+        sizes = _sizes_of(drawn, here.up)
         outline = _outline(rng, sum(sizes[one] * spectra[one] for one in sizes), radius_m)
-        found.append(_excess_of(known[number % len(known)].moved(outline, sizes, rng)))
-    sizes = _sizes_of(amplitudes.likely_m2)
-    seen = [_excess_of(one.moved(np.full(nodes, radius_m), sizes)) for one in known]
+        found.append(_excess_of(here.moved(outline, sizes, rng)))
+    seen = [
+        _excess_of(one.moved(np.full(nodes, radius_m), _sizes_of(amplitudes.likely_m2, one.up)))
+        for one in known
+    ]
     unseen = max(np.mean(found) - np.mean(seen), 0.0)
     return float(np.mean(found)), float(np.hypot(np.std(found, ddof=1), unseen))
 
@@ -152,7 +163,7 @@ class _Known:
     """What one ring makes of outlines at azimuths."""
 
     def __init__(self, ring, turn_rad, radius_m):
-        self._ring, self._turn = ring, turn_rad
+        self._ring, self._turn, self.up = ring, turn_rad, ring.up
         at = ring.azimuth_rad
         self._to_turn = azimuth_correlations(turn_rad, at, radius_m)
         self._among = azimuth_correlations(at, at, radius_m)
@@ -171,61 +182,140 @@ class _Known:
         return outline_m + sum(sizes[one] * (self._to_turn[one] @ pull) for one in sizes)
 
 
-def tangent_excess(amplitudes, radius_m):
-    """By how much the tangents of walls stand farther out than their radii at the same azimuth.
+def tangent_excess(amplitudes, radius_m, up, rings=(), most_m=np.inf):
+    """Excess of the tangents of a wall over its radius, beyond that of the most likely outline.
 
     Parameters
     ----------
     amplitudes : Amplitudes
-        Of the walls, and how well they are known.
+        Of the wall, and how well they are known.
     radius_m : float
+    up : array_like, shape (n,)
+        Heights above the foot of the shell, as parts of the shell's height.
+    rings : sequence of Ring, optional
+        Radii that were read round the wall; none: a wall that was not surveyed.
+    most_m : float
+        Largest rms departure from a circle that the wall can have; walls that are drawn rougher
+        than that are scaled down to it.
 
     Returns
     -------
-    mean_m : float
-        Over all azimuths and walls.
-    common_sd_m : float
-        Standard deviation of the mean of a wall.
-    own_sd_m : float
-        Of one tangent about that.
+    ndarray, shape (n, 3)
+        At each height: the mean over all azimuths and walls, its standard uncertainty, and the
+        standard deviation of a single tangent about the mean of its wall, m.
 
     Notes
     -----
-    Outlines are drawn from a fixed seed, and the hull's support function is measured.
+    Outlines that agree with the rings are drawn from a fixed seed (`seen_excess` has the equation),
+    the support functions of their hulls are measured (`support_of`), and that of the most
+    likely outline is subtracted. Without rings that is a circle, whose excess is zero. The excess
+    of convex outlines is quadratic in the departures, and settlement grows in proportion to the
+    height, so a parabola in the height smooths the values of the rings. The mean of the part that
+    the rings do not show counts as known to its own size, as in `seen_excess`.
 
     Examples
     --------
     >>> from tankcal.geometry.field.amplitudes import assumed_amplitudes
-    >>> mean, common, own = tangent_excess(assumed_amplitudes(), 6.5)
-    >>> 0 < mean < 1e-3
+    >>> foot, top = tangent_excess(assumed_amplitudes(), 6.5, [0.0, 1.0])
+    >>> bool(0 < foot[0] < top[0] < 1e-3)
     True
     """
-    spectra, rng = mode_shares(modes_of(radius_m), radius_m), np.random.default_rng(0)
-    means, spreads = [], []
-    for sizes in _drawn_sizes(amplitudes, rng):
-        variances = sum(sizes[one] * spectra[one] for one in sizes)
-        radii = _outline(rng, variances, radius_m)
-        at = len(radii) // TANGENTS * np.arange(TANGENTS)
-        excess = _support_at(at, radii) - radii[at]
-        means.append(excess.mean())
-        spreads.append(excess.var())
-    return float(np.mean(means)), float(np.std(means, ddof=1)), float(np.sqrt(np.mean(spreads)))
+    spectra = mode_shares(modes_of(radius_m), radius_m)
+    known = _known_rings(rings, radius_m) or [_Unread(up) for up in LEVELS]
+    drawn = _drawn_variances(amplitudes, np.random.default_rng(0))[:: 1 + len(known) // 4]
+    likely, circle, found = amplitudes.likely_m2, np.full(nodes_of(radius_m), radius_m), []
+    for one in known:
+        seen = _at_tangents(one.moved(circle, _bounded(_sizes_of(likely, one.up), most_m)))
+        means, spreads, rng = [], [], np.random.default_rng(1)  # the same walls at all heights
+        for variances in drawn:
+            sizes = _bounded(_sizes_of(variances, one.up), most_m)
+            outline = _outline(rng, sum(sizes[s] * spectra[s] for s in sizes), radius_m)
+            beyond = _at_tangents(one.moved(outline, sizes, rng)) - seen
+            means.append(beyond.mean())
+            spreads.append(beyond.var())
+        mean = max(float(np.mean(means)), 0.0)
+        found.append((mean, np.var(means, ddof=1) + mean**2 * bool(rings), np.mean(spreads)))
+    at_rings = np.vander([one.up for one in known], min(3, len(known)))
+    smooth = np.linalg.lstsq(at_rings, np.array(found), rcond=1e-3)[0]
+    smoothed = np.vander(np.asarray(up, dtype=float), len(smooth)) @ smooth
+    smoothed = np.maximum(smoothed, np.min(found, axis=0))  # no parabola goes below all rings
+    smoothed[:, 1:] **= 0.5
+    return smoothed
 
 
-def _drawn_sizes(amplitudes, rng):
-    """Variances of "oval" and "seam" of DRAWS walls, as unsure as the amplitudes are, m2."""
-    chosen = [i for i, one in enumerate(COMPONENTS) if one.shape in ("oval", "seam")]
+def _known_rings(rings, radius_m):
+    """`_Known` of at most MOST_RINGS of the rings."""
+    nodes = nodes_of(radius_m)
+    turn = FULL_TURN * np.arange(nodes) / nodes
+    chosen = np.unique(np.linspace(0, len(rings) - 1, MOST_RINGS).astype(int)) if rings else ()
+    return [_Known(rings[i], turn, radius_m) for i in chosen]
+
+
+def _bounded(sizes, most_m):
+    """Variances of the shapes, scaled down where they make a wall rougher than most_m (rms)."""
+    scale = min(1.0, most_m**2 / max(sum(sizes.values()), 1e-30))
+    return {shape: scale * size for shape, size in sizes.items()}
+
+
+def _at_tangents(radii_m):
+    """(TANGENTS,) support function less the radius, at even azimuths."""
+    at = len(radii_m) // TANGENTS * np.arange(TANGENTS)
+    return _support_at(at, radii_m) - radii_m[at]
+
+
+def support_of(radii_m):
+    """Support function of the convex hull of an outline.
+
+    Parameters
+    ----------
+    radii_m : ndarray, shape (n,)
+        At even azimuths clockwise from 0, m.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        At the same azimuths, m.
+
+    Examples
+    --------
+    >>> bulging = 6.5 + 0.002 * np.cos(3 * FULL_TURN * np.arange(720) / 720)
+    >>> float(round(1e6 * (support_of(bulging) - bulging).mean(), 2))  # 3^2 c^2 / (4 R)
+    1.38
+    """
+    return _support_at(np.arange(len(radii_m)), radii_m)
+
+
+@dataclass(frozen=True)
+class _Unread:
+    """A level at which no radius was read."""
+
+    up: float
+
+    def moved(self, outline_m, sizes, rng=None):
+        """The outline unchanged."""
+        return outline_m
+
+
+def _drawn_variances(amplitudes, rng):
+    """(DRAWS, components) variances of walls, as unsure as the amplitudes are, m2.
+
+    Components without waves round the wall have none.
+    """
+    chosen = [i for i, one in enumerate(COMPONENTS) if one.shape in ROUND_SHAPES]
     spread = amplitudes.log_covariance[np.ix_(chosen, chosen)]
     logs = np.log(amplitudes.likely_m2[chosen])
     drawn = np.zeros((DRAWS, len(COMPONENTS)))
     drawn[:, chosen] = np.exp(rng.multivariate_normal(logs, spread, size=DRAWS, method="eigh"))
-    return [_sizes_of(row) for row in drawn]
+    return drawn
 
 
-def _sizes_of(variances_m2):
-    """{"oval", "seam": variance of all components of that shape, m2}."""
-    found = {"oval": 0.0, "seam": 0.0}
+def _sizes_of(variances_m2, up):
+    """{shape: variance of all components of that shape at a height of the shell, m2}."""
+    found = dict.fromkeys(ROUND_SHAPES, 0.0)
+    at_height = Heights(np.zeros(1), np.array([up]))
     for one, size in zip(COMPONENTS, variances_m2, strict=True):
+        if one.shape == "settled":
+            size = size * one.height_covariance(at_height, at_height)[0, 0]
         if one.shape in found:
             found[one.shape] += float(size)
     return found

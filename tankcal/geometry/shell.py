@@ -22,7 +22,7 @@ from tankcal.geometry.clutter import (
 )
 from tankcal.geometry.columns import NONE, find_columns
 from tankcal.geometry.field.blunders import find_blunders
-from tankcal.geometry.field.sites import Sites
+from tankcal.geometry.field.sites import Sites, spans_of
 from tankcal.geometry.field.uprights import find_uprights
 from tankcal.geometry.seams import find_seams
 from tankcal.messages import message
@@ -195,7 +195,8 @@ def find_shell(
     if snooping:
         seams = _seams(local, course, candidates, in_band, found, nominal_radius_m)
         wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
-        where, of_wall = (local, course, zeta), (axis, relative, nominal_radius_m, welds_rad)
+        where = local, course, zeta, joints_m
+        of_wall = axis, relative, nominal_radius_m, welds_rad
         sure = seams | (kept & in_band)
         tested, stands = _by_field(*where, in_band, wall, kept, (sure, found.noise), *of_wall)
         wall[in_band], w[in_band], residual[in_band] = tested.accepted, tested.w, tested.departure_m
@@ -236,7 +237,7 @@ def find_shell(
 
 
 def _by_field(
-    local, course, zeta, in_band, wall, kept, shown, axis, relative, nominal_m, welds_rad
+    local, course, zeta, joints_m, in_band, wall, kept, shown, axis, relative, nominal_m, welds_rad
 ):
     """`Tested` of the points near the wall: each by the field that the accepted others show; and
     which of them are columns that no wall is likely to have.
@@ -250,7 +251,8 @@ def _by_field(
     seen, courses = np.unique(course[index], return_inverse=True)
     welds = tuple(np.asarray(welds_rad[one]) for one in seen) if welds_rad else ()
     ring, leans = find_rings(courses, zeta[index], azimuth)
-    sites = Sites(courses, ring, zeta[index], azimuth, leans, welds)
+    spans = spans_of(np.asarray(joints_m, dtype=float))[seen]
+    sites = Sites(courses, ring, zeta[index], azimuth, leans, welds, spans=spans)
     given = sites, distance, relative[index] ** 2, nominal_m
     may_go = ~kept[index]
     tested = find_blunders(*given, wall[index], may_go=may_go)

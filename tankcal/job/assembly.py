@@ -162,7 +162,7 @@ def make_job(raw, values, tables, attached, measurements, warnings):
 
     attached  attached.Attached        measurements  Measurements or None
     """
-    kind = values["tank"]["kind"]
+    kind, within_mm = values["tank"]["kind"], values["checks"]["diameter_within_mm"]
     points = _points(tables["points"], attached.covariance_m2)
     has_points = points is not None or measurements is not None
     frame = make_frame(raw, values, tables, measurements, warnings, has_points)
@@ -183,6 +183,7 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         sphere=_sphere(values["sphere"]) if kind == "sphere" else None,
         circumference_m=values["checks"]["circumference_m"],
         diameter_is=values["checks"]["diameter_is"],
+        diameter_within_m=None if within_mm is None else within_mm / 1000,
         inspection=_inspection(values["inspection"]),
         mesh=_mesh(values["mesh"], attached.mesh[1]) if kind == "mesh" else None,
         ship=_ship(values["ship"]) if kind == "mesh" and is_ship(values) else None,

@@ -5,6 +5,8 @@ are tankcal's own choice, wide enough for what is built, narrow enough for a sli
 words they stand in the table of `tankcal.job.plausibility_table`.
 """
 
+import math
+
 from tankcal.messages import message
 
 AMBIENT, HEATED, REFRIGERATED = SERVICES = ("ambient", "heated", "refrigerated")
@@ -15,6 +17,8 @@ CARBON_STEEL, STAINLESS_STEEL, ALUMINIUM = METALS = (
 )
 SHELLS = (*METALS, "other")
 INSIDE, MIDDLE, OUTSIDE = DIAMETERS = ("inside", "middle", "outside")
+PLATES_TO_INSIDE = {INSIDE: 0.0, MIDDLE: 0.5, OUTSIDE: 1.0}  # from that radius
+FLAT, RAISED = TARGETS = ("flat", "raised")
 
 MOST_YIELD_MPA = 2000  # of a shell's steel: more is pascals or psi
 
@@ -54,7 +58,11 @@ SOLID_PLATES_MM = {  # a lying cylinder or a sphere: least and most, each a + b 
     "sphere": ((1.0, 0.2), (6.0, 4.0)),
 }
 LEAST_PLATE_MM = 1.0
-PAINT_MM = 2.0
+PAINT_MM = 1.5
+TARGET_MM = {  # from the wall to the centre: film and thin magnets; prisms, balls, holders
+    FLAT: (0.0, 2.5),
+    RAISED: (2.5, 100.0),
+}
 RISING_PLATES = 1.1  # thickness of the top course over that of the bottom course
 
 NEAR_JOINT_M = 0.025  # rings are surveyed on plates, not on welds
@@ -100,6 +108,15 @@ TANK_C_STEP_K = 2.0  # of the liquid in the tank from dip to dip
 METER_DRIFT, MUCH_METER_DRIFT = 2e-4, 5e-4  # of a factor, before and after
 BATCH_SD = 1e-3  # sd of a batch by its meter, over the batch
 
+RATIO_MISS = 0.03  # of a ratio of two units: sizes and drawings differ by so much
+RATIOS = {  # of two sizes that should be equal
+    "feet": (1 / 0.3048,),
+    "radius": (2.0,),
+    "girth": (math.pi,),
+    "inches": (25.4, 1 / 0.0254),
+    "point": (10.0, 100.0, 1000.0),
+}
+
 TAKES_ROOM = (
     *("coil", "pipe", "tube", "column", "pillar", "ladder", "stair", "agitator", "mixer", "beam"),
     *("serpentina", "tubo", "tubulação", "coluna", "pilar", "escada", "agitador", "viga"),
@@ -110,6 +127,28 @@ GIVES_ROOM = (
     *("boca de ", "poço", "bocal", "porta", "domo", "recesso", "escotilha", "pote", "bolsa"),
     *("sumidero", "pozo", "boquilla", "tubuladura", "puerta", "escotilla", "receso"),
 )
+
+
+def unit_guess(ratio):
+    """Message with the likely cause of a ratio of two sizes that should be equal."""
+    ratio = max(ratio, 1 / ratio) if ratio > 0 else math.inf
+    cause = {
+        "feet": message("ratio_of_feet", ", as of feet and metres"),
+        "radius": message("ratio_of_radius", ", as of a diameter and a radius"),
+        "girth": message("ratio_of_girth", ", as of a circumference and a diameter"),
+        "inches": message("ratio_of_inches", ", as of an inch in place of a metric unit"),
+        "point": message("ratio_of_point", ", as of a decimal point in the wrong place"),
+    }
+    near = (
+        (abs(ratio / one - 1), text)
+        for name, text in cause.items()
+        for one in RATIOS[name]
+        if abs(ratio / one - 1) <= RATIO_MISS
+    )
+    text = min(near, key=lambda one: one[0], default=(0.0, ""))[1]
+    return message(
+        "ratio_of_sizes", "; they are as {ratio:.3g} to 1{cause}", ratio=ratio, cause=text
+    )
 
 
 def least_course_mm(diameter_m, head_m, density=LIGHT, shell="carbon_steel"):
@@ -133,7 +172,7 @@ def side_doubt(inside_m, nominal_m, drawn, plate_m, side, sd_m=0.0):
     """
     if drawn is None or nominal_m is None or (drawn != INSIDE and not plate_m):
         return None
-    expected = nominal_m - {INSIDE: 0.0, MIDDLE: plate_m, OUTSIDE: 2 * plate_m}[drawn]
+    expected = nominal_m - 2 * PLATES_TO_INSIDE[drawn] * plate_m
     miss, step = inside_m - expected, 2 * plate_m
     values = {
         "inside_m": inside_m,

@@ -194,12 +194,64 @@ TABLE = (
     ),
     Plausible(
         "tank.nominal_diameter_m",
-        f"{100 * limits.SIZE_MISS:g} % + {1000 * limits.SIZE_MISS_M:g} mm from the given diameter,"
-        f" {100 * limits.DIAMETER_MISS:g} % + {1000 * limits.DIAMETER_MISS_M:g} mm from that of the"
-        f" points; {100 * limits.IMPOSSIBLE_MISS:g} % is a problem",
-        "radius for diameter, feet",
-        "sizes and points",
-        ("size_unlike_drawing", "points_unlike_drawing", "points_too_wide"),
+        f"{100 * limits.SIZE_MISS:g} % + {1000 * limits.SIZE_MISS_M:g} mm from a diameter among the"
+        " sizes; 1 in 500, or checks.diameter_within_mm, and 3 sd from that of a survey by any"
+        " method, of all courses and of each (of points between inside and outside where"
+        f" checks.diameter_is is blank); {100 * limits.IMPOSSIBLE_MISS:g} % is a problem",
+        "radius for diameter, feet, a wrong offset, scale or side",
+        "sizes, inside radii of the survey",
+        (
+            *("size_unlike_drawing", "points_unlike_drawing", "points_too_wide"),
+            *("course_unlike_drawing", "size_in_other_unit", "wall_unlike_nominal"),
+            *("strapped_unlike_nominal", "rings_unlike_nominal", "sphere_unlike_nominal"),
+            *("circumference_of_inside", "strapped_unlike_declared"),
+        ),
+    ),
+    Plausible(
+        "targets.offset_mm",
+        "{:g} to {:g} mm; checks.targets raised {:g} to {:g} mm".format(
+            *limits.TARGET_MM[limits.FLAT], *limits.TARGET_MM[limits.RAISED]
+        ),
+        "ten times too large, the constant of a prism",
+        "checks.targets",
+        ("target_offset_strange",),
+    ),
+    Plausible(
+        "circumferences.reading_m, great_circles.reading_m",
+        f"{100 * limits.IMPOSSIBLE_MISS:g} % from the median of all (great circles 5 %) and from"
+        " the circumference by the drawing, more is a problem; ten times the limit of repeats from"
+        " each other, and from others of a course, a ring or a sphere; a course that stands apart"
+        " 1 in 1000 of the radius from the others, a ring a plate (half of one where laps are"
+        " given) and 1 in 500",
+        "feet, a metre misread, transposed digits, a strap over a manhole",
+        "one another, tank.nominal_diameter_m",
+        (
+            *("circle_of_other_size", "repeats_far", "strap_far", "strapped_course_far"),
+            *("strap_contradicts_far", "strap_of_ring_far", "circle_contradicts_far", "ring_far"),
+            *("strap_against_lines", "strip_upright", "weld_thick"),
+        ),
+    ),
+    Plausible(
+        "offsets.offset_mm",
+        "offsets and their steps from course to course as instruments and plates make them",
+        "centimetres, the wrong sign or side, levels from the top down",
+        "plates, the line's side, circumferences.reading_m",
+        ("offsets_small", "lines_of_inside", "lines_turned_about"),
+    ),
+    Plausible(
+        "instruments.toml: certificates of tapes and other instruments",
+        "corrections within what a verification allows; temperatures, pulls and sections of tapes"
+        " that there are; offsets and scales within 3 sd of the certificate where the wall or a"
+        " tape determines them",
+        "ppm, percent or degrees Fahrenheit, the constant of a prism, another tape",
+        "the readings, circumferences.temperature_c, survey.shell_temperature_c",
+        (
+            *("tape_correction_strange", "tape_correction_mm_strange", "large_correction"),
+            *("tape_in_fahrenheit", "tape_unlike_shell", "certified_temperature_strange"),
+            *("tape_stiffness_strange", "pull_unlike_certificate", "comparisons_apart"),
+            *("offset_strange", "offset_unlike_certificate", "scale_unlike_certificate"),
+            "hits_ranged_otherwise",
+        ),
     ),
     Plausible(
         "radius_m of radii.csv",
@@ -315,11 +367,11 @@ TABLE = (
         ("circumference_off",),
     ),
     Plausible(
-        "check readings, distances between control points",
-        "4 sd",
-        "slope distances 0.1 % too long",
+        "check readings, distances between control points, bases by stadia",
+        "4 sd; no base is rejected",
+        "slope distances 0.1 % too long, the length of another bar",
         "the adjusted survey",
-        ("check_reading_off", "check_point_off", "control_scale"),
+        ("check_reading_off", "check_point_off", "control_scale", "base_rejected"),
     ),
     Plausible(
         "liquid.csv: meter_temperature_c, tank_temperature_c, shell_temperature_c",
@@ -367,10 +419,11 @@ TABLE = (
         "liquid.volume_m3",
         f"standard deviation of a batch by its meter at most {100 * limits.BATCH_SD:g} % of it;"
         " well above a bottom and well within a lying tank 0.7 to 1.4 times what the nominal sizes"
-        " hold between its dips, most of them over 5 or under 0.2 times a problem",
+        " hold between its dips, most of them over 5 or under 0.2 times a problem; no cause of"
+        " liquid and geometry beyond 6.6 sd",
         "litres, gallons, barrels, a batch missing, a valve that passes, a dip misread",
         "meters.toml, nominal sizes",
-        ("batch_too_small", "batch_unlike_sizes", "batches_in_other_unit"),
+        ("batch_too_small", "batch_unlike_sizes", "batches_in_other_unit", "liquid_far_because"),
     ),
 )
 CODES = frozenset(code for one in TABLE for code in one.codes)

@@ -171,10 +171,8 @@ def _by_kind(survey):
 def _warnings(job, adjustment, sighting, survey, made, liquid, overruled):
     of_survey, of_liquid = (), ()
     if adjustment is not None:
-        from tankcal.pipeline.stadia_checks import check_bases
-
         left_open = open_questions(job, adjustment.datum, adjustment.causes)
-        of_survey = (*adjustment.warnings, *left_open, *check_bases(job.measurements))
+        of_survey = (*adjustment.warnings, *left_open, *_warnings_of_bases(job, adjustment))
     if liquid is not None:
         from tankcal.pipeline.liquid_checks import check_liquid_result
 
@@ -188,6 +186,13 @@ def _warnings(job, adjustment, sighting, survey, made, liquid, overruled):
         *incomplete_certificate(job),
     )
     return placed(job, warnings)
+
+
+def _warnings_of_bases(job, adjustment):
+    from tankcal.pipeline.stadia_checks import check_bases, check_rejected_bases
+
+    rejected = check_rejected_bases(job.measurements, adjustment.readings)
+    return (*check_bases(job.measurements), *rejected)
 
 
 @contextmanager
@@ -239,11 +244,9 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> "Adju
                 ),
             )
         )
-    from tankcal.pipeline.stadia_checks import check_bases
-
     with _telling(job):
         adjustment = adjust_decided(job, progress or (lambda text: None))
-    warnings = (*adjustment.warnings, *check_bases(job.measurements))
+    warnings = (*adjustment.warnings, *_warnings_of_bases(job, adjustment))
     return replace(adjustment, warnings=placed(job, warnings))
 
 

@@ -6,8 +6,6 @@ from tankcal.errors import InputError, Problem
 from tankcal.job.plausibility import (
     CIRCUMFERENCE_MISS,
     CIRCUMFERENCE_SDS,
-    DIAMETER_MISS,
-    DIAMETER_MISS_M,
     IMPOSSIBLE_MISFIT,
     MISFIT,
     MISFIT_M,
@@ -51,7 +49,7 @@ def check_scan(job, scan, top_m):
     given = job.horizontal or job.sphere
     plate = given.thickness_m if job.survey.side == "outside" else 0.0
     inside = diameter - 2 * plate
-    problems = [*_against_drawing(job, diameter), *check_side(job, inside, plate, 0.0)]
+    problems = [*check_side(job, inside, plate, 0.0)]
     if scan.noise_m > MISFIT * diameter + MISFIT_M:
         text = message(
             "points_misfit",
@@ -104,10 +102,9 @@ def check_mesh(job, top_m):
 
 
 def check_wall(job, wall):
-    """Warnings of a vertical wall: its diameter against drawing and tape, its bottom's slope."""
+    """Warnings of a vertical wall: its side, its diameter against a tape, its bottom's slope."""
     radius = float(np.mean([section.circle.radius_m for section in wall.sections]))
     return [
-        *_against_drawing(job, 2 * radius),
         *_against_plates(job, wall),
         *_against_tape(job, wall),
         *_beyond_ends(job, wall, radius),
@@ -259,20 +256,6 @@ def stations_of(adjustment, measurements):
         found += list(adjustment.adjusted.photos[0])
     found = np.array(found, dtype=float).reshape(-1, 3)
     return found[np.isfinite(found).all(axis=1)]
-
-
-def _against_drawing(job, diameter_m):
-    nominal = job.tank.nominal_diameter_m
-    if nominal is None or abs(diameter_m - nominal) <= DIAMETER_MISS * nominal + DIAMETER_MISS_M:
-        return []
-    text = message(
-        "points_unlike_drawing",
-        "{nominal_m:g} m, but the points give {found_m:.4f} m: they differ by {percent:+.1f} %",
-        nominal_m=nominal,
-        found_m=diameter_m,
-        percent=100 * (diameter_m / nominal - 1),
-    )
-    return [Problem("job.toml", text, column="tank.nominal_diameter_m")]
 
 
 def _of_reference(job, top_m):

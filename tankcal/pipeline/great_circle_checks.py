@@ -8,7 +8,8 @@ from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline import tape_checks
-from tankcal.pipeline.strapping_checks import NOMINAL_SHARE, check_repeats
+from tankcal.pipeline.nominal_size import allowed_departure_m
+from tankcal.pipeline.strapping_checks import FAR_LIMITS, check_repeats, limit_of_repeats
 from tankcal.pipeline.survey_limits import limits_of
 
 FILE = "great_circles.csv"
@@ -98,7 +99,7 @@ def _of_nominal(job, sphere):
             miss_mm=1000 * miss,
         )
         yield Problem(FILE, text, column="reading_m")
-    elif abs(miss) > NOMINAL_SHARE * nominal / 2:
+    elif abs(miss) > allowed_departure_m(job):
         text = message(
             "sphere_unlike_nominal",
             "the sphere comes out {miss_mm:+.0f} mm of radius from the nominal one",
@@ -113,14 +114,17 @@ def _contradicted(sphere):
     for place, w in zip(sphere.adjusted, sphere.w, strict=True):
         if abs(w) > CRITICAL:
             strap = sphere.reduced[place].strap
-            text = message(
-                "circle_contradicts",
+            template = (
                 "circle {name!r} is {miss_mm:+.1f} mm from what all others show (w = {w:.1f}): is"
-                " it misread, off its great circle or over an obstruction?",
-                name=strap.name,
-                miss_mm=1000 * missed[place],
-                w=abs(w),
+                " it misread, off its great circle or over an obstruction?"
             )
+            name, miss, size = strap.name, 1000 * missed[place], abs(w)
+            if abs(missed[place]) > FAR_LIMITS * limit_of_repeats(
+                sphere.reduced[place].circumference_m
+            ):
+                text = message("circle_contradicts_far", template, name=name, miss_mm=miss, w=size)
+            else:
+                text = message("circle_contradicts", template, name=name, miss_mm=miss, w=size)
             yield Problem(FILE, text, strap.row, "reading_m")
     for place in np.setdiff1d(np.arange(len(missed)), sphere.adjusted):
         apart = abs(missed[place]) / sphere.sd_of_check_m(place)

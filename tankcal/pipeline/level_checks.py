@@ -3,13 +3,11 @@
 import numpy as np
 
 from tankcal.errors import Problem
-from tankcal.job.plausibility import DIAMETER_MISS, MIDDLE, OUTSIDE
 from tankcal.messages import list_some, message
 from tankcal.pipeline.cross_checks import is_size_declared
-from tankcal.pipeline.wall_straps import mean_radii
+from tankcal.pipeline.nominal_size import allowed_departure_m, inside_radii, nominal_radius_m
 
 SHOWN = 5  # names in a message
-NOMINAL_SHARE = 1 / 500  # of the radius: a shell that departs by more from the nominal one
 
 
 def levels_with_few(wall, least):
@@ -46,12 +44,9 @@ def check_nominal(job, wall, file):
 
     An offset or a scale that nothing else controls goes into the radius, and shows here alone.
     """
-    plates = np.array([one.thickness_m + one.paint_m for one in job.courses])
-    inside = mean_radii(wall.field) - plates * (job.survey.side == "outside")
-    drawn = {MIDDLE: 0.5, OUTSIDE: 1.0}.get(job.diameter_is, 0.0) * plates[0]
-    nominal = job.tank.nominal_diameter_m / 2
-    miss = float(np.median(inside)) - (nominal - drawn)
-    if NOMINAL_SHARE * nominal < abs(miss) <= DIAMETER_MISS * nominal:  # more: another check tells
+    found = inside_radii(job, wall)
+    miss = float(np.median(found.radius_m)) - nominal_radius_m(job, float(found.plate_m[0]))
+    if abs(miss) > allowed_departure_m(job):
         text = message(
             "wall_unlike_nominal",
             "the courses come out {miss_mm:+.0f} mm of radius from the nominal one: is the offset"

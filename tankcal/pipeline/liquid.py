@@ -39,6 +39,7 @@ from tankcal.tank.liquid import fill_of, name_causes
 from tankcal.tank.liquid.readings import batch_sd_m3
 
 OF_NO_WEIGHT_M = 1.0  # standard deviation of a dip that does not count
+CONTROLLED = ("meter", "leak")  # causes that change all volumes: what hides of them is stated
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,10 @@ def _settled(found):
 def _result(measured, levels):
     job, found = measured.job, measured.joint
     adjusted, run = found.adjusted, found.run_effect
-    causes = name_causes(adjusted, alternatives_of(found))
+    tables = _tables(measured, levels)
+    causes = _with_reliability(
+        measured, name_causes(adjusted, alternatives_of(found)), tables, levels
+    )
     radii = next((one for one in causes if one.cause.kind == "radii"), None)
     detectable = radii.detectable if radii and np.isfinite(radii.detectable) else None
     return LiquidResult(
@@ -156,8 +160,27 @@ def _result(measured, levels):
         detectable_radius_m=detectable,
         causes=causes,
         filled_m=filled_range_m(job.liquid),
-        tables=_tables(measured, levels),
+        tables=tables,
     )
+
+
+def _with_reliability(measured, causes, tables, levels):
+    """The `Verdict`s with `undetected_U`: what an error that no test shows does to the table."""
+    certified = measured.job.liquid.certified
+    if certified == "geometry":  # no reading of the liquid moves it
+        return causes
+    body, U = measured.body, tables[certified].U_m3
+    known = np.isfinite(U) & (U > 0)
+    by_y = body.by_misclosures(np.clip(levels[known], body.lowest_m, body.highest_m))
+
+    def undetected(one):
+        if one.cause.kind not in CONTROLLED or not np.any(known):
+            return None
+        if not np.isfinite(one.detectable):
+            return np.inf
+        return float(one.detectable * np.max(np.abs(by_y @ one.cause.column) / U[known]))
+
+    return tuple(replace(one, undetected_U=undetected(one)) for one in causes)
 
 
 def _tables(measured, levels):
@@ -247,7 +270,7 @@ def _checks(found):
         s_dip_m=np.where(compared, OF_NO_WEIGHT_M, metering.s_dip_m),
     )
     geometry = replace(geometry, job=replace(geometry.job, liquid=loose))
-    again = adjusted_at(geometry, fill_of(loose), lambda *_: found.run_effect)
+    again = adjusted_at(geometry, fill_of(loose), lambda *_: found.run_effect, found.corrections_m)
     effect = next(one for one in again.adjusted.noise if one.kind == "dip_readings")
     deviates, redundancy, _ = again.adjusted.residuals(effect)
     mine = compared[again.fill.dip_row]

@@ -2,6 +2,13 @@
 
 found = adjust_liquid(Geometry(job, survey))
 body = join_body(found.known)
+
+Volumes and columns are taken at the adjusted dips h + e, not at the dips as read (Gauss-Helmert):
+
+    metered - T V(h + e0) + T A e0  =  T C z + T A e + ...,    V, A, C all at h + e0.
+
+Columns at the dips as read share their errors with the misclosures. With many steps that makes the
+scale of the tank too small by n u^2, n steps and u its relative standard uncertainty.
 """
 
 from dataclasses import dataclass, replace
@@ -38,7 +45,8 @@ from tankcal.uncertainty import Source
 MOST_ROUNDS, SETTLED = 30, 1e-3  # steps to the joint values; the last, in sds
 LEAST_GAIN, MOST_LEFT = 1e-7, 1e-2  # of a fit: by a step, and by all that could follow
 HALVINGS = 12  # of a step that leads to no tank, or to a worse fit
-RUN_ROUNDS, RUN_SETTLED = 4, 0.01  # of the run effect with the sizes; its last change, relative
+ROUNDS = 6  # of the sizes, the run effect and the adjusted dips in turn
+RUN_SETTLED, DIPS_SETTLED = 0.01, 0.01  # last change: relative; in sds of a dip
 ROUNDING = 1e-9  # of a fit
 LOST = 1e-12  # of the largest effect of readings: less is none
 BOTTOM, FLEX, RUNS = "bottom_volume", "bottom_flex", "run_effect"
@@ -61,6 +69,8 @@ class LiquidFound:
     run_effect : RunEffect
     before : Reduced
         Against the geometry as it was before; before_sd_m3 (n,) of its misclosures.
+    corrections_m : ndarray, shape (rows,)
+        Of the dips of all rows, at which the geometry was taken; 0: as read.
     misfit : float
         Chi-square with the sizes held where they are, and of the sizes.
     is_settled : bool
@@ -77,7 +87,18 @@ class LiquidFound:
     before: Reduced
     before_sd_m3: np.ndarray
     misfit: float
+    corrections_m: np.ndarray
     is_settled: bool = True
+
+    @property
+    def adjusted_m(self):
+        """(rows,) corrections of the dips that the adjustment asks for; 0 where none counts."""
+        metering, found = self.known.geometry.job.liquid, np.zeros(len(self.corrections_m))
+        effect = next((one for one in self.adjusted.noise if one.kind == "dip_readings"), None)
+        if effect is not None:
+            rows = self.fill.dip_row
+            found[rows] = metering.s_dip_m[rows] * self.adjusted.residuals(effect)[0]
+        return found
 
 
 def adjust_liquid(geometry):
@@ -99,18 +120,27 @@ def adjust_liquid(geometry):
         )
         raise InputError(Problem(geometry.job.liquid.file, expected))
     found = first = adjusted_at(geometry, fill, _run_effect)
-    if geometry.movable:
-        for _ in range(RUN_ROUNDS):
-            before = found.run_effect
+    for _ in range(ROUNDS):
+        before, settled = found, True
+        if geometry.movable:
             found = _settled(found, fill)
             settled = found.is_settled
-            found = adjusted_at(found.known.geometry, fill, _run_effect)
-            found = replace(found, is_settled=settled)
-            if abs(found.run_effect.sd - before.sd) <= RUN_SETTLED * before.sd:
-                break
+        found = adjusted_at(found.known.geometry, fill, _run_effect, found.adjusted_m)
+        found = replace(found, is_settled=settled)
+        if _is_steady(before, found):
+            break
     if found.is_settled:
         _refuse_dips_outside(found.known.geometry, fill)
     return replace(found, before=first.before, before_sd_m3=first.before_sd_m3)
+
+
+def _is_steady(before, found):
+    """Whether a round changed neither the run effect nor the dips that the next one would take."""
+    sd = found.known.geometry.job.liquid.s_dip_m
+    moved = np.abs(found.adjusted_m - found.corrections_m)
+    change = abs(found.run_effect.sd - before.run_effect.sd)
+    is_same_run = change <= RUN_SETTLED * before.run_effect.sd
+    return is_same_run and bool(np.all(moved <= DIPS_SETTLED * np.nan_to_num(sd)))
 
 
 def _settled(found, fill):
@@ -145,7 +175,7 @@ def _better(found, wanted, fill, run_effect):
     for share in (0.5**halving for halving in range(HALVINGS)):
         moves = {name: at[name] + share * (value - at[name]) for name, value in wanted.items()}
         try:
-            one = adjusted_at(geometry.moved_to(moves), fill, run_effect)
+            one = adjusted_at(geometry.moved_to(moves), fill, run_effect, found.corrections_m)
         except SolutionError:  # no such tank
             continue
         if best is not None and one.misfit >= best.misfit:
@@ -155,12 +185,15 @@ def _better(found, wanted, fill, run_effect):
     return best
 
 
-def adjusted_at(geometry, fill, run_effect):
-    """`LiquidFound` with the geometry linear where it is now."""
+def adjusted_at(geometry, fill, run_effect, corrections_m=None):
+    """`LiquidFound` with the geometry linear where it is now, at dips with corrections (rows,)."""
     metering = geometry.job.liquid
+    if corrections_m is None:
+        corrections_m = np.zeros(len(metering))
     densities = np.append(metering.density_kg_m3, load_densities(metering, fill))
     rows = fill.dip_row
-    loaded = load_geometry(geometry, densities, metering.dip_m[rows], metering.shell_c[rows])
+    dips = metering.dip_m[rows] + corrections_m[rows]
+    loaded = load_geometry(geometry, densities, dips, metering.shell_c[rows])
     reduced = reduce_steps(metering, fill, loaded.volume_m3, loaded.growth)
     about = loaded.volume_m3, loaded.area_m2 * loaded.growth, loaded.growth
     readings = reading_effects(metering, fill, reduced, *about)
@@ -170,7 +203,8 @@ def adjusted_at(geometry, fill, run_effect):
     moved = tuple(
         (places[name], geometry.moves.get(name, 0.0) / places[name].u) for name in geometry.movable
     )
-    misclosure = reduced.misclosure_m3.copy()
+    held = reduced.misclosure_m3 + over @ (about[1] * corrections_m[rows])
+    misclosure = held.copy()
     for place, deviate in moved:
         misclosure += deviate * column_of(sources, place)
     effects = [Effect("geometry", stacked(sources, len(fill))), *readings.common]
@@ -193,20 +227,22 @@ def adjusted_at(geometry, fill, run_effect):
         run_effect=run,
         before=reduced,
         before_sd_m3=np.linalg.norm(np.hstack(every), axis=1),
-        misfit=_misfit(adjusted, reduced, sources, moved),
+        misfit=_misfit(adjusted, held, sources, moved),
+        corrections_m=corrections_m,
     )
 
 
-def _misfit(adjusted, reduced, sources, moved):
-    """Chi-square of the misclosures with the moved inputs held where they are, and of these."""
+def _misfit(adjusted, misclosure, sources, moved):
+    """Chi-square of misclosures (n,) with the moved inputs held where they are, and of these."""
     if not moved:
         return adjusted.chi2
     held = np.stack([column_of(sources, place) for place, _ in moved], axis=1)
     every = [one.columns for one in (*adjusted.noise, *adjusted.effects)]
     whole = np.hstack(every)
     covariance = whole @ whole.T - held @ held.T
-    y, deviates = reduced.misclosure_m3, np.array([deviate for _, deviate in moved])
-    return float(y @ np.linalg.solve(covariance, y) + deviates @ deviates)
+    deviates = np.array([deviate for _, deviate in moved])
+    fit = misclosure @ np.linalg.solve(covariance, misclosure)
+    return float(fit + deviates @ deviates)
 
 
 def _of_the_bottom(geometry, metering, fill, loaded, over):

@@ -130,11 +130,8 @@ class JointBody(Body):
     def sources(self, levels_m):
         """One `Source` for each cause: those of geometry, then those of liquid."""
         levels, known = np.asarray(levels_m, dtype=float), self.known
-        of_geometry = self._of_geometry(self.plain, levels)
-        by_y = stacked(of_geometry, len(levels)) @ known.gain
-        head = self._head_m(levels)
-        by_y = by_y + np.outer(known.share(levels), _or_nothing(known.bottom_gain, by_y))
-        by_y = by_y + np.outer(head, _or_nothing(known.flex_gain, by_y))
+        of_geometry, head = self._of_geometry(self.plain, levels), self._head_m(levels)
+        by_y = self.by_misclosures(levels, of_geometry)
         found = [
             _less(one, other, by_y) for one, other in zip(of_geometry, known.sources, strict=True)
         ]
@@ -146,6 +143,18 @@ class JointBody(Body):
                        estimate=known.flex)
             )  # fmt: skip
         return (*(one for one in found if np.any(one.columns_m3)), *self._below_first(levels))
+
+    def by_misclosures(self, levels_m, of_geometry=None):
+        """Derivative of the volumes below levels by the misclosures, shape (rows, n).
+
+        of_geometry  sources of the geometry at the levels; None: they are computed
+        """
+        levels, known = np.asarray(levels_m, dtype=float), self.known
+        if of_geometry is None:
+            of_geometry = self._of_geometry(self.plain, levels)
+        by_y = stacked(of_geometry, len(levels)) @ known.gain
+        by_y = by_y + np.outer(known.share(levels), _or_nothing(known.bottom_gain, by_y))
+        return by_y + np.outer(self._head_m(levels), _or_nothing(known.flex_gain, by_y))
 
     def rows(self, levels_m):
         """(volumes, areas, sources) of a table."""

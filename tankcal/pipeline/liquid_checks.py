@@ -6,11 +6,13 @@ from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
-from tankcal.pipeline.liquid_naming import causes_in_words
+from tankcal.pipeline.liquid_naming import causes_in_words, is_steady_leak, leak_unit
 from tankcal.pipeline.survey_limits import limits_of
 
 TOLD = 3  # steps that are told one by one
+FAR = 2 * CRITICAL  # test quantity of a cause, from which it moves the table beyond U
 CONTROLLED = 1e-6  # redundancy of a reading below which nothing tests it
+HIDDEN_U = 2.0  # change of a volume, in its U, by an error that no test shows: more is told
 
 
 def check_liquid_result(job, found):
@@ -27,6 +29,8 @@ def check_liquid_result(job, found):
         *_disagreement(job.liquid, found),
         *_single_readings(job.liquid, found),
         *_compared(job.liquid, found),
+        *_leak(job.liquid, found),
+        *_meters(job.liquid, found),
         *_bottom(job, found),
         *_alone(job.liquid, found),
     )
@@ -38,13 +42,15 @@ def _disagreement(metering, found):
     if found.probability >= limits_of("liquid")["global_probability"] and not named:
         return
     if named:
-        text = message(
-            "liquid_disagrees_because",
+        template = (
             "liquid and geometry disagree, at {w:.1f} times the standard deviation; the likeliest "
-            "cause is {cause}",
-            w=abs(named[0].w),
-            cause=causes_in_words(named),
+            "cause is {cause}"
         )
+        w, cause = abs(named[0].w), causes_in_words(named)
+        if w > FAR:
+            text = message("liquid_far_because", template, w=w, cause=cause)
+        else:
+            text = message("liquid_disagrees_because", template, w=w, cause=cause)
     else:
         text = message(
             "liquid_disagrees",
@@ -54,6 +60,43 @@ def _disagreement(metering, found):
             dof=found.dof,
         )
     yield Problem(metering.file, text)
+
+
+def _leak(metering, found):
+    """A drift with time that is not named among all causes: a test of its own, of one in 1000."""
+    steady = next((one for one in found.causes if is_steady_leak(one)), None)
+    is_named = any(one.is_named for one in found.causes)
+    if steady is None or is_named or abs(steady.w) <= CRITICAL:
+        return
+    text = message(
+        "liquid_drifts",
+        "the steps differ from the geometry as if a valve passed {size:+.3f} {unit}, at {w:.1f} "
+        "times the standard deviation: read the dip before and after hours at rest (use = rest)",
+        size=steady.size,
+        unit=leak_unit(steady.cause),
+        w=abs(steady.w),
+    )
+    yield Problem(metering.file, text)
+
+
+def _meters(metering, found):
+    """Meters that neither a second proving nor the steps control."""
+    for one in found.causes:
+        hidden = one.undetected_U
+        if one.cause.kind != "meter" or hidden is None or hidden <= HIDDEN_U:
+            continue
+        if metering.meters[one.cause.of].factor_after is not None:
+            continue
+        text = message(
+            "meter_unchecked",
+            "nothing checks the factor of meter {name}: an error of {percent:.2g} % would not "
+            "show, and would change a volume by {times:.1f} times its U; prove it again afterwards "
+            "(factor_after), or fill a part through a second meter",
+            name=one.cause.of,
+            percent=100 * one.detectable,
+            times=hidden,
+        )
+        yield Problem(metering.meters_file, text, column=f"{one.cause.of}.factor_after")
 
 
 def _single_readings(metering, found):

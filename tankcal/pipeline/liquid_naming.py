@@ -123,11 +123,20 @@ def _cause(one):
     return _so_or_not(one, size)
 
 
+def is_steady_leak(one):
+    """Whether a `Verdict` is of a leak in all runs."""
+    return one.cause.kind == "leak" and one.cause.of is None
+
+
+def leak_unit(cause):
+    """Unit of the size of a leak, as written."""
+    return cause.unit if cause.unit != "m3" else message("m3_a_step", "m3 a step")
+
+
 def _so_or_not(one, size):
     if one.cause.kind == "leak":
-        unit = one.cause.unit if one.cause.unit != "m3" else message("m3_a_step", "m3 a step")
         return message("cause_leak", "a valve that passes, {size:+.3f} {unit}", size=size,
-                       unit=unit)  # fmt: skip
+                       unit=leak_unit(one.cause))  # fmt: skip
     if one.cause.kind == "fahrenheit":
         return message("cause_fahrenheit", "temperatures in degrees Fahrenheit")
     return message("cause_swapped", "temperatures at the meter and in the tank that changed places")

@@ -10,13 +10,16 @@ from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.compared_courses import exchanged_courses
 from tankcal.pipeline.cross_checks import check_side
+from tankcal.pipeline.nominal_size import allowed_departure_m, departure_of_size
 from tankcal.pipeline.strapping_checks import (
+    FAR_LIMITS,
     FILE,
-    NOMINAL_SHARE,
     check_repeats,
+    limit_of_repeats,
     read_once,
     straps_apart,
 )
+from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.tape_checks import check_tapes
 from tankcal.pipeline.wall_readings import names_of
 
@@ -31,6 +34,7 @@ def check_rings(job, wall):
         *check_tapes(job, straps),
         *check_repeats(straps, LIMITS),
         *_of_pairs(job, straps),
+        *_of_others(job, straps),
         *_of_laps(job, straps),
         *_of_nominal(job, straps),
         *_uncontrolled(job, wall),
@@ -44,17 +48,57 @@ def _problem(text, row=None, column="reading_m"):
 def _of_pairs(job, straps):
     """A strap that stands far from the others of its ring, further than rings taper."""
     for size, one, count, usual in straps_apart(names_of(job.rings), straps):
-        text = message(
-            "strap_of_ring_apart",
+        template = (
             "the {count} straps of ring {ring!r} differ by {apart_mm:.1f} mm, those of other rings"
             " by {usual_mm:.1f} mm: is one of them misread, over an obstruction or not square to"
-            " the axis?",
-            count=count,
-            ring=one.strap.course,
-            apart_mm=1000 * size,
-            usual_mm=1000 * usual,
+            " the axis?"
         )
+        ring, apart, least = one.strap.course, 1000 * size, 1000 * usual
+        if size > FAR_LIMITS * limit_of_repeats(one.circumference_m, LIMITS):
+            text = message(
+                "strap_of_ring_far",
+                template,
+                count=count,
+                ring=ring,
+                apart_mm=apart,
+                usual_mm=least,
+            )
+        else:
+            text = message(
+                "strap_of_ring_apart",
+                template,
+                count=count,
+                ring=ring,
+                apart_mm=apart,
+                usual_mm=least,
+            )
         yield _problem(text, one.strap.row)
+
+
+def _of_others(job, straps):
+    """A ring whose radius differs from the median of the others of its lap by more than a part of
+    a plate and a tolerance; where laps are not given, by a plate more.
+    """
+    plates = np.array([ring.thickness_m + ring.paint_m for ring in job.rings])
+    inside, names = straps.radius_m - plates, names_of(job.rings)
+    laps = np.array([ring.lap or "" for ring in job.rings])
+    step = float(np.max(plates)) * (FITS if np.all(laps != "") else 1.0)
+    if np.any(laps == ""):
+        laps[:] = ""
+    for lap in dict.fromkeys(laps.tolist()):
+        alike = np.flatnonzero(laps == lap)
+        median = float(np.median(inside[alike]))
+        allowed = limits_of("nominal_size")["share"] * median + step
+        for place in alike[np.abs(inside[alike] - median) > allowed]:
+            text = message(
+                "ring_far",
+                "ring {ring!r} comes out {miss_mm:+.1f} mm of radius from the others, more than a"
+                " lap: is a strap of it misread or over an obstruction, or is its plate another"
+                " one?",
+                ring=names[place],
+                miss_mm=1000 * float(inside[place] - median),
+            )
+            yield _problem(text, column="ring")
 
 
 def _of_laps(job, straps):
@@ -170,12 +214,13 @@ def _of_nominal(job, straps):
     plates = np.array([ring.thickness_m + ring.paint_m for ring in job.rings])
     inside = 2 * float(np.mean(straps.radius_m - plates))
     yield from check_side(job, inside, float(np.mean(plates)), 0.0)
-    if job.diameter_is is None and abs(inside - nominal) > NOMINAL_SHARE * nominal:
-        text = message(
-            "rings_unlike_nominal",
-            "the rings come out {miss_mm:+.0f} mm of inside diameter from the nominal one",
-            miss_mm=1000 * (inside - nominal),
-        )
+    if job.diameter_is is None and abs(inside - nominal) > 2 * allowed_departure_m(job):
+        template = "the rings come out {miss_mm:+.0f} mm of inside diameter from the nominal one"
+        miss = 1000 * (inside - nominal)
+        if departure_of_size(job, inside / 2, float(np.mean(plates))):
+            text = message("rings_unlike_nominal", template, miss_mm=miss)
+        else:
+            text = message("rings_short_by_plates", template, miss_mm=miss)
         yield _problem(text)
 
 

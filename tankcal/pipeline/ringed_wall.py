@@ -25,6 +25,7 @@ from tankcal.survey.strapping import reduce_straps, tapes_used
 from tankcal.tank.factors import Factor
 from tankcal.tank.rings import WAVES
 
+UPRIGHT_M = 7.5  # radius of the measured shell: smaller rings bulge less, as the root of R
 FLATTENED = 0.5  # of the variance round a ring: by its own weight, on saddles
 KIND_OF_WAVES = {"oval": "ovality", "seam": "seams"}
 
@@ -174,7 +175,11 @@ def find_ringed_wall(job, progress, amplitudes=None):
     readings = readings_of_straps([reduced[i] for i in places], names_of(job.rings), term)
     joints = np.concatenate([[0.0], np.cumsum([one.length_m for one in job.rings])])
     readings, tested, field = adjust_readings(
-        readings, (joints, 0.0, nominal), amplitudes, snooping=job.snooping
+        readings,
+        (joints, 0.0, nominal),
+        amplitudes,
+        snooping=job.snooping,
+        bulge_scale=min(np.sqrt(nominal / UPRIGHT_M), 1.0),
     )
     return RingedWall(
         joints_m=joints,

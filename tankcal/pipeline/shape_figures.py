@@ -11,7 +11,7 @@ import scipy
 
 from tankcal.geometry.field.components import COMPONENTS, KINDS
 from tankcal.geometry.field.values import FieldValues, Spots
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.geometry.outlines import FULL_TURN, radii_square_to_axis
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.tanks.vertical import bearing_inputs, insets_of
 from tankcal.tank.hydrostatics import LiquidHead
@@ -106,6 +106,8 @@ class ShapeBase:
         inset = np.array(insets_of(job, job.switches))[spots.course]
         self._head_m, self.state = self._widening()
         self._surveyed = self._found.value_m.copy()
+        # the field has no ellipse of the lean; these are radii of horizontal sections
+        self._surveyed[: self._count] /= radii_square_to_axis(spots.azimuth_rad, 1.0, self._slope)
         self._value_m = self._surveyed.copy()
         self._value_m[: self._count] += self._head_m - inset
         self._sources = self._causes()

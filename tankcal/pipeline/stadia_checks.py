@@ -30,6 +30,40 @@ def check_bases(measurements):
     return tuple(chain.from_iterable(_of_base(*item) for item in bases.items()))
 
 
+def check_rejected_bases(measurements, readings):
+    """`Problem`s of bases that the adjustment rejected: two scales contradict each other.
+
+    The few bases of a survey are outvoted by its many distances, whichever of them is wrong.
+
+    Parameters
+    ----------
+    measurements : Measurements
+    readings : Readings
+        Of their adjustment.
+    """
+    bars = {one.name for one in measurements.instruments if one.kind == KIND}
+    bases = {
+        (table.file, row)
+        for table in measurements.readings
+        if table.table == "distances" and table.rows
+        for row, name in zip(table.rows, table.instrument, strict=True)
+        if name in bars
+    }
+    for one in readings.where(readings.removed):
+        if (one.file, one.row) in bases:
+            text = message(
+                "base_rejected",
+                "the base {first} to {second} was rejected, {off_mm:+.1f} mm from the other"
+                " distances (|w| = {w:.1f}): is the length of the bar or the scale of the"
+                " distances wrong?",
+                first=one.ids[0],
+                second=one.ids[1],
+                off_mm=-1000 * one.residual,
+                w=abs(one.w),
+            )
+            yield Problem(one.file, text, one.row, "to")
+
+
 def _of_base(ends, readings):
     starts, lengths, rows, files, sds = zip(*readings, strict=True)
     if len(set(starts)) < 2:

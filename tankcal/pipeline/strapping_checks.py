@@ -12,15 +12,17 @@ from tankcal.messages import message
 from tankcal.pipeline.compared_courses import course_apart, exchanged_courses
 from tankcal.pipeline.cross_checks import check_side, is_size_declared
 from tankcal.pipeline.moved_setups import tested
-from tankcal.pipeline.survey_limits import limit_at
+from tankcal.pipeline.nominal_size import allowed_departure_m, departure_of_size, nominal_radius_m
+from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.tape_checks import check_tapes
 from tankcal.pipeline.wall_readings import FORMER
 
 FILE = "circumferences.csv"
-NOMINAL_SHARE = 1 / 500  # of the radius: a course that departs by more from the nominal one
 FLUSH, LEAST_STEP_M = 0.5, 1e-3  # of a step of plates that the outside shows; that shows it
 SHORT_BY_PLATES = 0.5, 1.5  # of a plate: so short of the nominal radius
+SURELY_FLUSH, SURELY_SHORT_BY_PLATES = 0.25, (0.75, 1.25)  # not plates whose middles are flush
 FAR_REPEATS = 5  # limits of repeats by which a course is far from all others, at least
+FAR_LIMITS = 10  # limits of repeats from which a reading is grossly wrong: 5 mm of radius
 FARTHEST_M = 1.0  # sd of a departure that something controls
 APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826  # of differences within a course
 
@@ -108,25 +110,30 @@ def _of_contradicted(straps, together):
     ]
     for place, accepted, w, departure in (*apart.values(), *single):
         one = straps.reduced[place]
-        named = {
-            "name": one.strap.name,
-            "course": one.strap.course,
-            "miss_mm": 1000 * departure * straps.per_radius,
-            "w": abs(w),
-        }
-        if accepted:
+        name, course, size = one.strap.name, one.strap.course, abs(w)
+        miss = 1000 * departure * straps.per_radius
+        template = (
+            "circumference {name!r} of course {course!r} is {miss_mm:+.1f} mm from what the points"
+            " and all other straps show (w = {w:.1f}): which of them is wrong?"
+        )
+        far = abs(miss) > 1000 * FAR_LIMITS * limit_of_repeats(one.circumference_m)
+        if accepted and far:
             text = message(
-                "strap_contradicts",
-                "circumference {name!r} of course {course!r} is {miss_mm:+.1f} mm from what the"
-                " points and all other straps show (w = {w:.1f}): which of them is wrong?",
-                **named,
+                "strap_contradicts_far", template, name=name, course=course, miss_mm=miss, w=size
+            )
+        elif accepted:
+            text = message(
+                "strap_contradicts", template, name=name, course=course, miss_mm=miss, w=size
             )
         else:
             text = message(
                 "strap_set_aside",
                 "circumference {name!r} of course {course!r} is {miss_mm:+.1f} mm from what the"
                 " points and all other straps show (w = {w:.1f}) and was set aside",
-                **named,
+                name=name,
+                course=course,
+                miss_mm=miss,
+                w=size,
             )
         yield _problem(text, one.strap)
 
@@ -144,32 +151,37 @@ def check_repeats(straps, table="repeats"):
         if len(several) < 2:
             continue
         found = [one.circumference_m for one in several]
-        limit = limit_of_repeats(found[0], table)
-        if max(found) - min(found) > limit:
-            text = message(
-                "repeats_apart",
+        limit, apart = limit_of_repeats(found[0], table), max(found) - min(found)
+        if apart > limit:
+            template = (
                 "the readings of circumference {name!r} differ by {apart_mm:.1f} mm; expected at"
-                " most {limit_mm:g} mm",
-                name=name,
-                apart_mm=1000 * (max(found) - min(found)),
-                limit_mm=1000 * limit,
+                " most {limit_mm:g} mm"
             )
+            mm, most = 1000 * apart, 1000 * limit
+            if apart > FAR_LIMITS * limit:
+                text = message("repeats_far", template, name=name, apart_mm=mm, limit_mm=most)
+            else:
+                text = message("repeats_apart", template, name=name, apart_mm=mm, limit_mm=most)
             yield _problem(text, several[int(np.argmax(found))].strap)
 
 
 def _of_pairs(job, straps):
     """A strap that stands far from the others of its course, further than courses taper."""
     for size, one, count, usual in straps_apart([course.name for course in job.courses], straps):
-        text = message(
-            "strap_apart",
+        template = (
             "the {count} straps of course {course!r} differ by {apart_mm:.1f} mm, those of"
             " other courses by {usual_mm:.1f} mm: is one of them misread, over an obstruction"
-            " or not level?",
-            count=count,
-            course=one.strap.course,
-            apart_mm=1000 * size,
-            usual_mm=1000 * usual,
+            " or not level?"
         )
+        course, apart, least = one.strap.course, 1000 * size, 1000 * usual
+        if size > FAR_LIMITS * limit_of_repeats(one.circumference_m):
+            text = message(
+                "strap_far", template, count=count, course=course, apart_mm=apart, usual_mm=least
+            )
+        else:
+            text = message(
+                "strap_apart", template, count=count, course=course, apart_mm=apart, usual_mm=least
+            )
         yield _problem(text, one.strap)
 
 
@@ -199,44 +211,49 @@ def _of_courses(job, straps):
     """Inside radii against the nominal one, and pairs of courses that fit better exchanged."""
     plates = np.array([course.thickness_m + course.paint_m for course in job.courses])
     inside, names = straps.radius_m - plates, [course.name for course in job.courses]
-    nominal = job.tank.nominal_diameter_m / 2
-    median = float(np.median(inside))
-    steps_inside = _steps_inside(job, straps, plates)
-    if abs(median - nominal) > NOMINAL_SHARE * nominal or steps_inside:
-        by_plates = abs(median + np.median(plates) - nominal) < abs(median - nominal) / 4
-        if by_plates or steps_inside:
-            text = message(
-                "circumference_of_inside",
-                "the courses come out {miss_mm:+.0f} mm of radius from the nominal one, about"
-                " their plates: is the nominal diameter that of the outside, or are the"
-                " circumferences those of the inside?",
-                miss_mm=1000 * (median - nominal),
-            )
-        else:
+    nominal, median = nominal_radius_m(job, float(plates[0])), float(np.median(inside))
+    slope, short = _slope_and_shortness(job, straps, plates)
+    low, high = SHORT_BY_PLATES
+    steps_inside = slope < FLUSH and low < short < high
+    if abs(median - nominal) > allowed_departure_m(job) or steps_inside:
+        miss, plate = 1000 * (median - nominal), float(np.median(plates))
+        template = (
+            "the courses come out {miss_mm:+.0f} mm of radius from the nominal one, about their"
+            " plates: is the nominal diameter that of the outside, or are the circumferences those"
+            " of the inside?"
+        )
+        low, high = SURELY_SHORT_BY_PLATES
+        if slope < SURELY_FLUSH and low < short < high:
+            text = message("circumference_of_inside", template, miss_mm=miss)
+        elif departure_of_size(job, median, plate) and not steps_inside:
             text = message(
                 "strapped_unlike_nominal",
                 "the courses come out {miss_mm:+.0f} mm of radius from the nominal one",
-                miss_mm=1000 * (median - nominal),
+                miss_mm=miss,
             )
+        else:
+            text = message("courses_short_by_plates", template, miss_mm=miss)
         yield _problem(text)
+    share = limits_of("nominal_size")["share"] * nominal
     strapped = {one.strap.course for one in straps.reduced}
     both = [i for i, name in enumerate(names) if name in strapped]  # lines tell the others
     exchanged = exchanged_courses(straps.radius_m, plates, both)
     far = {
         name: radius - median
         for name, radius in zip(names, inside, strict=True)
-        if abs(radius - median) > NOMINAL_SHARE * nominal
+        if abs(radius - median) > share
     }
     if not far and exchanged is None:
         far = _far_from_others(straps, names, inside)
     for name, away in far.items():
-        text = message(
-            "strapped_course_apart",
+        template = (
             "course {name!r} comes out {miss_mm:+.1f} mm of radius from the others: did its straps"
-            " lie over an obstruction, or is its plate another one?",
-            name=name,
-            miss_mm=1000 * away,
+            " lie over an obstruction, or is its plate another one?"
         )
+        if abs(away) > share / 2:
+            text = message("strapped_course_far", template, name=name, miss_mm=1000 * away)
+        else:
+            text = message("strapped_course_apart", template, name=name, miss_mm=1000 * away)
         yield _problem(text, column="course")
     if exchanged is not None:
         one, other, left, steps = exchanged
@@ -263,20 +280,22 @@ def _far_from_others(straps, names, inside_m):
     return {} if found is None or names[found[0]] in told else {names[found[0]]: found[1]}
 
 
-def _steps_inside(job, straps, plates_m):
-    """Whether the courses are short of the nominal radius by about their plates, and the outside
-    does not step with these: circumferences of the inside, or plates that are flush outside.
+def _slope_and_shortness(job, straps, plates_m):
+    """Step of the outside over that of the plates, and shortness of the nominal radius in plates.
+
+    The slope is 1 where plates are flush inside, 0 of circumferences of the inside and of plates
+    that are flush outside; inf where the steps do not show it.
     """
+    plate = float(np.median(plates_m))
+    short = job.tank.nominal_diameter_m / 2 - float(np.median(straps.radius_m - plates_m))
+    short = short / plate if plate > 0 else 0.0
     strapped = {one.strap.course for one in straps.reduced}
     if len(strapped) < len(plates_m) or np.ptp(plates_m) < LEAST_STEP_M:
-        return False
+        return np.inf, short
     if job.diameter_is is not None:  # `check_side` looks to the plate
-        return False
+        return np.inf, short
     steps = plates_m - plates_m.mean()
-    slope = straps.radius_m @ steps / (steps @ steps)  # 1 where they are flush inside
-    short = job.tank.nominal_diameter_m / 2 - float(np.median(straps.radius_m - plates_m))
-    low, high = SHORT_BY_PLATES
-    return slope < FLUSH and low < short / float(np.median(plates_m)) < high
+    return float(straps.radius_m @ steps / (steps @ steps)), short
 
 
 def _of_first_course(job, straps):
@@ -284,7 +303,8 @@ def _of_first_course(job, straps):
     course = job.courses[0]
     plate = course.thickness_m + course.paint_m
     yield from check_side(job, 2 * (straps.radius_m[0] - plate), plate, 0.0)
-    found, declared = straps.circumference_m[0], job.circumference_m
+    found = straps.circumference_m[0] + straps.rise_m * straps.per_radius  # where it was strapped
+    declared = job.circumference_m
     if declared is not None and abs(found - declared) > limit_of_repeats(found):
         yield Problem(
             "job.toml",

@@ -7,6 +7,7 @@ import numpy as np
 import scipy.sparse
 
 from tankcal.geometry.field.estimate import WallField
+from tankcal.geometry.field.section_noise import noise_of_sections
 from tankcal.geometry.shell import Shell
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.told_unknowns import ToldUnknowns
@@ -154,6 +155,13 @@ class Wall:
         for name, column in self.by_inputs.items():
             found[name] = found.get(name, 0.0) + weights @ column
         return found
+
+    @cached_property
+    def section_noise(self):
+        """`SectionNoise` of each section, by the points of the field."""
+        ring = self.field.sites.ring[: self.points_read]
+        members = [np.flatnonzero(ring == number) for number in range(len(self.sections))]
+        return noise_of_sections(self.field, members)
 
     @property
     def readings(self):

@@ -14,6 +14,7 @@ from tankcal.job.model import Job
 from tankcal.job.tables import in_book
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
+from tankcal.pipeline.nominal_size import refuse_other_size
 from tankcal.pipeline.overruled_points import refuse_kept_readings, with_decided_readings
 from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.survey_warnings import refuse_undetermined
@@ -122,6 +123,7 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
         refuse_other_side(job, partial(is_within_wall, survey), adjustment)
     elif adjustment is not None and not is_sighted and is_surveyed_as(survey, "scan"):
         refuse_other_side(job, survey.is_within, adjustment)
+    refuse_other_size(job, survey)
     if job.radii is not None and not is_surveyed_as(survey, "radii"):
         from tankcal.pipeline.partial_survey import update_by_survey
 

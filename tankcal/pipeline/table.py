@@ -10,6 +10,7 @@ import numpy as np
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
+from tankcal.pipeline.nominal_size import check_size
 from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
 from tankcal.pipeline.surveying import is_surveyed_as
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
@@ -29,6 +30,7 @@ from tankcal.tank.falling_capacity import refuse_falling
 from tankcal.uncertainty import ROUNDING, combine
 
 CLOSED = 1e-3  # of its largest free surface: one that is smaller at the top counts as none
+SAME_DIP_M = 1e-6  # of a row and a joint
 
 
 @dataclass(frozen=True)
@@ -115,10 +117,28 @@ def compute_table(job, survey, progress=lambda text: None, body=None):
         probability=spec.coverage_probability,
         critical_m=critical_zone(job),
     )
-    dips = np.union1d(heights, breakpoints)
+    dips = distinct_dips(heights, breakpoints)
     refuse_falling(job, body, zero, dips, exact(dips))
     straightness = interpolation_errors(exact, heights, breakpoints)
     return ComputedTable(body, zero, levels, breakpoints, table, straightness)
+
+
+def distinct_dips(heights_m, breakpoints_m):
+    """Rows, and breakpoints that do not coincide with a row but for rounding.
+
+    Across a joint the table of geometry and liquid steps by the difference of the areas times the
+    estimated error of the joint's height, a few millilitres, which only two dips closer than that
+    would take for a fall.
+
+    Examples
+    --------
+    >>> distinct_dips(np.array([4.79, 4.8]), np.array([4.795, 4.8 + 1e-15])).tolist()
+    [4.79, 4.795, 4.8]
+    """
+    above = np.searchsorted(heights_m, breakpoints_m)
+    near = heights_m[np.clip([above - 1, above], 0, len(heights_m) - 1)]
+    apart = np.abs(near - breakpoints_m).min(axis=0)
+    return np.union1d(heights_m, breakpoints_m[apart > SAME_DIP_M])
 
 
 def check_table(job, survey, made, sighting=None):
@@ -137,9 +157,11 @@ def check_table(job, survey, made, sighting=None):
     -------
     tuple of Problem
     """
+    of_size = check_size(job, survey)
     if is_surveyed_as(survey, "radii"):
         survey = survey.surveyed
     return (
+        *of_size,
         *_doubts_of_survey(job, survey, made.top_m),
         *_doubts_of_sights(job, survey, sighting),
         *warn_of_undeclared(_undeclared(job, survey, made.body)),

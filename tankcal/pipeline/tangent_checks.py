@@ -80,7 +80,7 @@ def judge_tangents(job, wall, touching):
     precision, pull = tested(field, whole, sites)
     weight = np.maximum(np.diag(precision), 1e-300)
     departure[at], w[at] = pull / weight, pull / np.sqrt(weight)
-    own = (job.tangents.sd_rad * touching.length_m) ** 2 + touching.excess[2] ** 2
+    own = (job.tangents.sd_rad * touching.length_m) ** 2 + touching.hull.own_sd_m**2
     redundancy[at] = np.clip(own[at] * weight, 0, 1)
     mdb[at] = noncentrality() / np.sqrt(weight)
     setups = moved_setups(

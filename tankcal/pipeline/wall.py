@@ -9,14 +9,15 @@ import scipy.sparse
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.geometry.field.amplitudes import estimate_amplitudes
 from tankcal.geometry.field.cells import MOST_SITES, cells_of, sites_of_cells
-from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES
+from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES, ROUND_SHAPES
 from tankcal.geometry.field.estimate import WallField
-from tankcal.geometry.field.sites import Sites
+from tankcal.geometry.field.sites import Sites, spans_of
 from tankcal.geometry.outlines import FULL_TURN, polar
 from tankcal.geometry.shell import WIDE_BAND, course_of, find_shell
 from tankcal.messages import Message, message
 from tankcal.pipeline.overruled_points import decisions_of, refuse_kept
 from tankcal.pipeline.point_covariance import given_covariance, median_sd, radial_sds
+from tankcal.pipeline.section_homogeneity import warn_of_sections
 from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.survey_warnings import (
     noise_is_estimated,
@@ -129,7 +130,8 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     to_fit = _to_fit(job, shell, accepted, groups, covariance)
     nominal = job.tank.nominal_diameter_m / 2
     samples = [sample_of(*one) for one in to_fit]
-    sites, means = _sites(groups, samples, nominal, _welds(job), is_smoothed(job))
+    of_wall = {"welds_rad": _welds(job), "spans": spans_of(joints), "smoothed": is_smoothed(job)}
+    sites, means = _sites(groups, samples, nominal, of_wall)
     undecided = means @ undecided_halves(shell, accepted, groups)
     radius = means @ np.concatenate([one.radius_m for one in samples]) - undecided.sum(axis=1)
     noise = (means @ scipy.sparse.block_diag(_blocks(samples)) @ means.T).toarray()
@@ -250,8 +252,11 @@ def _welds(job):
     return given if any(map(len, given)) else ()
 
 
-def _sites(groups, samples, nominal_m, welds_rad, smoothed):
-    """`Sites` of the field, and (sites, points) weights of the points in each: one, or a cell."""
+def _sites(groups, samples, nominal_m, of_wall):
+    """`Sites` of the field, and (sites, points) weights of the points in each: one, or a cell.
+
+    of_wall  what the sites have of the whole wall, by the names of their attributes
+    """
     counts = [len(one.radius_m) for one in samples]
     sites = Sites(
         course=np.repeat([one.course for one in groups], counts),
@@ -259,8 +264,7 @@ def _sites(groups, samples, nominal_m, welds_rad, smoothed):
         zeta=np.concatenate([one.zeta for one in samples]),
         azimuth_rad=np.concatenate([one.azimuth_rad for one in samples]),
         leans=np.repeat([one.degree > 0 for one in groups], counts),
-        welds_rad=welds_rad,
-        smoothed=smoothed,
+        **of_wall,
     )
     if len(sites) <= MOST_SITES:
         return sites, scipy.sparse.eye_array(len(sites), format="csr")
@@ -281,7 +285,7 @@ def _blocks(samples):
 
 def _form_m2(amplitudes):
     """Amplitude of k^-3 that has all departures from a circle: what smooths an outline."""
-    chosen = [one.shape in ("oval", "seam") for one in COMPONENTS]
+    chosen = [one.shape in ROUND_SHAPES for one in COMPONENTS]
     return float(np.sum(amplitudes.likely_m2[chosen])) / np.sum(OVALITY_MODES**-3)
 
 
@@ -337,6 +341,7 @@ def warnings_of(job, wall):
         *check_shell(job, wall.shell, wall.sections, sds),
         *warn_of_vague_points(job.points, wall.accepted, sds, wall.shell.noise_m),
         *warn_of_vague_vertical(job.points),
+        *warn_of_sections(job, wall),
     )
 
 

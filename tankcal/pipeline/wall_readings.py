@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tankcal.geometry.field.blunders import MOST_ROUNDS, restricted_precision, snoop_wall
-from tankcal.geometry.field.sites import Sites, free_design
+from tankcal.geometry.field.sites import Sites, free_design, spans_of
 from tankcal.survey.reference_line import level_names
 from tankcal.tank.factors import Factor
 
@@ -178,6 +178,7 @@ def sites_of(readings, joints_m, zero_m):
         azimuth_rad=np.array([one.azimuth_rad for one in readings]),
         leans=np.zeros(len(readings), dtype=bool),
         shared=np.column_stack(list(free.values())) if free else None,
+        spans=spans_of(joints_m),
     )
 
 

@@ -14,7 +14,7 @@ import scipy.linalg
 from tankcal.adjust import noncentrality
 from tankcal.geometry.field.amplitudes import estimate_amplitudes
 from tankcal.geometry.field.blunders import Tested
-from tankcal.geometry.field.components import COMPONENTS
+from tankcal.geometry.field.components import COMPONENTS, ROUND_SHAPES
 from tankcal.geometry.field.estimate import LEVELS, WallField
 from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.girth import Ring, perimeter_excess, seen_excess
@@ -58,22 +58,23 @@ def area_term(shape_sd_m, amplitudes, nominal_m, points=None):
     """
     is_declared = shape_sd_m is not None
     if not is_declared:
-        waves = [one.shape in ("oval", "seam") for one in COMPONENTS]
+        waves = [one.shape in ROUND_SHAPES for one in COMPONENTS]
         shape_sd_m = float(np.sqrt(amplitudes.likely_m2[waves].sum()))
     if is_declared or points is None:
         return AreaTerm(*perimeter_excess(shape_sd_m, nominal_m)), shape_sd_m
-    return AreaTerm(*seen_excess(amplitudes, nominal_m, _rings_of(points))), shape_sd_m
+    return AreaTerm(*seen_excess(amplitudes, nominal_m, rings_of(points))), shape_sd_m
 
 
-def _rings_of(points):
-    """`Ring`s of points, of no more than MOST_OF_RING each."""
+def rings_of(points):
+    """`Ring`s of a `WallField`, or of `PointsOfWall`: no more than MOST_OF_RING readings each."""
     found, sites = [], points.sites
     for ring in np.unique(sites.ring[sites.ring >= 0]):
         mine = np.flatnonzero(sites.ring == ring)
         mine = mine[np.argsort(sites.azimuth_rad[mine] % FULL_TURN)]  # what is drawn hangs on it
         mine = mine[:: -(-len(mine) // MOST_OF_RING)]
         noise = points.noise_m2[np.ix_(mine, mine)]
-        found.append(Ring(sites.azimuth_rad[mine], points.radius_m[mine], noise))
+        up = float(sites.heights.up[mine].mean())
+        found.append(Ring(sites.azimuth_rad[mine], points.radius_m[mine], noise, up))
     return found
 
 
@@ -104,6 +105,8 @@ class Straps:
         {course index: standard uncertainty of its plate by a gauge}.
     tapes : tuple of (Tape, float)
         Those that were read, and the standard uncertainty of their scale by a master.
+    rise_m : float
+        How far the straps of the first course lie above its mean radius by an assumed barrel.
     """
 
     reduced: tuple[Reduced, ...]
@@ -117,6 +120,7 @@ class Straps:
     radius_m: np.ndarray
     plate_sd_m: dict
     tapes: tuple
+    rise_m: float = 0.0
 
     @property
     def per_radius(self):
@@ -333,5 +337,6 @@ def _joined(points, straps):
         **{name: np.concatenate([getattr(points, name), getattr(straps, name)]) for name in names},
         welds_rad=points.welds_rad,
         points=tuple(np.concatenate(pair) for pair in zip(points.seen, straps.seen, strict=True)),
+        spans=straps.spans,
         smoothed=points.smoothed,
     )

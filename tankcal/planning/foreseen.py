@@ -7,6 +7,7 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import list_some, message
+from tankcal.pipeline.section_homogeneity import OF_SCATTER
 from tankcal.pipeline.stadia_checks import check_bases
 from tankcal.pipeline.survey_warnings import SHOWN, open_questions
 from tankcal.pipeline.table import check_table
@@ -17,10 +18,11 @@ from tankcal.planning.given import PLAN_FILE
 def foreseen(prediction):
     """A tuple of Problem: those of the plan, of its network, of the wall and of the table."""
     tabled = prediction.tabled
+    of_table = check_table(_correlated(tabled), tabled.wall, tabled.made)
     of_run = (
         *prediction.predicted.frame.warnings,
         *open_questions(tabled.job, prediction.datum, tabled.job.points.causes),
-        *check_table(_correlated(tabled), tabled.wall, tabled.made),
+        *(one for one in of_table if getattr(one.expected, "code", None) not in OF_SCATTER),
     )
     return (
         *prediction.plan.warnings,

@@ -26,7 +26,7 @@ def choices_of(result):
     values = {
         "zero": zero_of(result),
         **(_shell_choices(job, result) if result.wall is not None else {}),
-        **(_strapped_choices(job) if result.strapped is not None else {}),
+        **(_strapped_choices(job, result.strapped) if result.strapped is not None else {}),
         **_liquid_choices(result),
         **_radii_choices(result),
         **_ring_choices(result),
@@ -87,7 +87,7 @@ def _shell_choices(job, result):
         "bottom": _bottom_choice(job),
         **_measured_by(job, result),
         "course_of_points": "section" if any(job.points.section) else "height",
-        "shape": _one_or_mixed(section.outline.kind for section in wall.sections),
+        "shape": "smoothed",
         "between_sections": "field",
         "tilt": _tilt_choice(job, wall.shell),
         "course_heights": "along_axis",
@@ -115,7 +115,7 @@ def _measured_by(job, result):
     return found
 
 
-def _strapped_choices(job):
+def _strapped_choices(job, strapped):
     """What was assumed about a shell that a tape was put round."""
     roof = job.roof and job.roof.weighing
     return {
@@ -128,6 +128,7 @@ def _strapped_choices(job):
         "course_heights": "along_axis",
         "roof": _fitting_choice(job.switches.roof, roof, roof),
         "form": "learned",
+        **({"barrel": 1000 * strapped.barrel_m} if strapped.barrel_m else {}),
     }
 
 
@@ -148,7 +149,7 @@ def _sphere_choices(job):
     """How a sphere was taken that great circles describe, and the pressure that it is for."""
     found = {}
     if job.great_circles is not None:
-        found["survey"] = "great_circles"
+        found |= {"survey": "great_circles", "between_sections": "ellipsoid"}
     if job.sphere is not None and job.switches.head and job.table.pressure_pa:
         found["pressure"] = job.table.pressure_pa / 1e5
     return found
@@ -255,8 +256,3 @@ def _thickness_choice(job, result):
     if not given:
         return "none"
     return "subtracted" if job.switches.plate and job.switches.paint else "off"
-
-
-def _one_or_mixed(values):
-    found = set(values)
-    return found.pop() if len(found) == 1 else "mixed"

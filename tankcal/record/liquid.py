@@ -91,6 +91,18 @@ class LiquidCause(Saved):
     named: bool = key("whether it is the likeliest, or cannot be told from that, and is told")
 
 
+class LiquidControl(Saved):
+    """How far the steps control an error that would change all volumes."""
+
+    kind: str = key("meter or leak")
+    of: str | None = key("which meter; null: of all runs")
+    unit: str = key('of the size, in SI: "1", "m3/h", or "m3" in each step where times are blank')
+    detectable: float | None = key("smallest size that the test finds; null: none")
+    undetected_U: float | None = key(
+        "largest change of a volume by an error of that size, over the U of the volume; null: any"
+    )
+
+
 class SizeByLiquid(Saved):
     """A declared size of the geometry that the liquid moved."""
 
@@ -145,6 +157,11 @@ class LiquidRecord(Saved):
     by_geometry: VolumesBeside = key("rows of the table by the geometry alone")
     by_liquid: VolumesBeside | None = key("by the liquid alone; null: it does not tell the tank")
     joint: VolumesBeside = key("by both")
+    controls: list[LiquidControl] | None = key(
+        "errors that change all volumes; not there: the table is of geometry alone, or of older"
+        " versions",
+        optional=True,
+    )
 
 
 def liquid_of(result):
@@ -185,6 +202,7 @@ def liquid_of(result):
         by_geometry=_volumes(found.tables["geometry"]),
         by_liquid=_volumes(found.tables["liquid"]),
         joint=_volumes(found.tables["joint"]),
+        controls=_controls(found),
     )
 
 
@@ -306,6 +324,24 @@ def _causes(found):
             )
         )
     return told
+
+
+def _controls(found):
+    """Of each meter, and of a steady leak in all runs; None where no reading moves the table."""
+    from tankcal.pipeline.liquid_naming import is_steady_leak
+
+    told = [
+        LiquidControl(
+            kind=one.cause.kind,
+            of=one.cause.of,
+            unit=one.cause.unit,
+            detectable=one.detectable if np.isfinite(one.detectable) else None,
+            undetected_U=one.undetected_U if np.isfinite(one.undetected_U) else None,
+        )
+        for one in found.causes
+        if one.undetected_U is not None and (one.cause.kind == "meter" or is_steady_leak(one))
+    ]
+    return sorted(told, key=lambda one: (one.kind == "leak", one.of or "")) or None
 
 
 def _volumes(table):

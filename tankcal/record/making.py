@@ -23,6 +23,7 @@ from tankcal.record.choices import Choice, adjustment_choices, choices_of
 from tankcal.record.clouds import CloudsRecord, clouds_of
 from tankcal.record.great_circles import GreatCirclesRecord, great_circles_of
 from tankcal.record.hits import HitsRecord, hits_of
+from tankcal.record.homogeneity import HomogeneityRecord, homogeneity_record
 from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.liquid import LiquidRecord, liquid_of
 from tankcal.record.long_tables import LongTables
@@ -89,6 +90,11 @@ class Record(Saved, kw_only=True):
         optional=True,
     )
     sections: list[survey.SectionCircle] = key("from the bottom up", default=())
+    homogeneity: HomogeneityRecord | None = key(
+        "of the noise of the sections; left out where no section has a noise of its own",
+        default=None,
+        optional=True,
+    )
     strapping: StrappingRecord | None = key(
         "circumferences by tape; left out where there are none", default=None, optional=True
     )
@@ -165,6 +171,7 @@ def record_of(result):
             rejected=survey.rejected_of(result),
             overrulings=overrulings_of(result),
             sections=survey.sections_of(result),
+            homogeneity=homogeneity_record(job, result.wall),
             strapping=strapping_of(result),
             lines=lines_of(result),
             hits=hits_of(result),

@@ -91,7 +91,7 @@ class SectionCircle(Saved):
     radius_m: Finite = key("of the circle", of="circle.radius_m")
     radius_sd_m: float = key("its sd")
     variance_factor: float = key("v'Pv/(n-3): how far from a circle", of="circle.variance_factor")
-    shape: str = key('"interpolated" or "smoothed"', of="outline.kind")
+    shape: str = key('"smoothed"; "interpolated" in sections of former versions')
     points: list[str] = key("names")
     azimuth_deg: list[Finite] = key("of the points")
     residual_m: list[Finite] = key("of the points from the circle", of="circle.residuals_m")
@@ -258,6 +258,7 @@ def _section_of(result, section):
         x_sd_m=sd[0],
         y_sd_m=sd[1],
         radius_sd_m=sd[2],
+        shape="smoothed",
         points=[result.job.points.names[i] for i in members],
         azimuth_deg=np.degrees(np.arctan2(offset[:, 0], offset[:, 1])) % 360,
         area_m2=outline.area_m2(),

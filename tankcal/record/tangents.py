@@ -78,14 +78,14 @@ def tangents_of(result):
     from tankcal.pipeline.tangent_checks import judge_tangents
 
     tests = judge_tangents(result.job, result.wall, result.touching)
-    mean, common, own = result.touching.excess
+    hull = result.touching.hull
     return TangentsRecord(
         setups=_setups(result, tests),
         levels=_levels(result, tests),
         readings=_readings(result, tests),
-        excess_m=mean,
-        excess_sd_m=common,
-        excess_own_sd_m=own,
+        excess_m=float(hull.excess_m.mean()),
+        excess_sd_m=float(hull.common_sd_m.mean()),
+        excess_own_sd_m=float(hull.own_sd_m.mean()),
     )
 
 

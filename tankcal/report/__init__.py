@@ -17,6 +17,7 @@ _NOT_IN_ALL = (
     "deliveries",
     "rule",
     "monte_carlo",
+    "homogeneity",
     "strapping",
     "lines",
     "hits",

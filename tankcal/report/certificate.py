@@ -5,6 +5,7 @@ Printed when given, never invented: what is not given is a line to write on, or 
 
 from tankcal.job.plausibility_table import CODES
 from tankcal.report import blocks
+from tankcal.report.metered_liquid import hidden_errors
 from tankcal.report.tables.facts import (
     CERTIFICATE,
     REFERENCES,
@@ -47,18 +48,20 @@ def _in_the_head(paper, key, certificate):
 
 
 def doubtful_input(paper):
-    """What is implausible of the numbers handed in, under the result; [] where nothing is.
+    """Implausible input, and what no reading checks, under the result; [] where there is neither.
 
     Such a number may move the volume by far more than U says: it stands where nobody misses it.
     """
-    told = doubts_of(paper.record["warnings"])
-    if not told:
-        return []
-    return [
-        blocks.notice(paper.word("certificate.doubtful")),
-        blocks.paragraph(paper.word("certificate.implausible")),
-        blocks.listing(told),
-    ]
+    told, hidden, found = doubts_of(paper.record["warnings"]), hidden_errors(paper), []
+    if told:
+        found += [
+            blocks.notice(paper.word("certificate.doubtful")),
+            blocks.paragraph(paper.word("certificate.implausible")),
+            blocks.listing(told),
+        ]
+    if hidden:
+        found += [blocks.notice(paper.word("certificate.unchecked")), blocks.listing(hidden)]
+    return found
 
 
 def doubts_of(warnings):

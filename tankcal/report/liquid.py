@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.pipeline.plot_style import FAINT, GREY, INK, RED, WIDTH, Drawing, set_margins, styled
 from tankcal.report import numbers
-from tankcal.report.metered_liquid import density_text, with_u
+from tankcal.report.metered_liquid import control_text, density_text, with_u
 from tankcal.report.tables import liquid as tables
 
 MOST_ROWS = 16  # of the table of volumes on paper; all are in the workbook
@@ -33,8 +33,14 @@ def facts(paper):
             ("liquid_flex", _estimate(paper, liquid, "bottom_flex", "L/m")),
             ("liquid_test", _test(paper, liquid)),
             ("liquid_radius", paper.number(liquid["detectable_radius_m"], "mm", digits=2)),
+            ("liquid_hidden", _hidden(paper, liquid)),
         ]
     )
+
+
+def _hidden(paper, liquid):
+    """What the steps would not show of errors that change all volumes; None of older records."""
+    return " ".join(control_text(paper, one) for one in liquid.get("controls") or ()) or None
 
 
 def range_text(paper):

@@ -91,6 +91,40 @@ class Tangents:
 
 
 @dataclass(frozen=True)
+class Hull:
+    """Convex hull of the wall, which tangents touch, at n tangents.
+
+    Attributes
+    ----------
+    excess_m : ndarray, shape (n,)
+        By how much the hull is expected to stand outside the wall at the normal of the tangent, m.
+    common_sd_m : ndarray, shape (n,)
+        Standard uncertainty of the excess that all tangents share, m.
+    own_sd_m : ndarray, shape (n,)
+        Standard deviation of the sights from a set-up to one limb about the expected excess, m.
+    slope_m : ndarray, shape (n,)
+        Derivative p'(f) of the support function, m/rad: the tangent touches the wall at this
+        distance from the foot of the axis, in the direction of growing azimuths.
+    """
+
+    excess_m: np.ndarray
+    common_sd_m: np.ndarray
+    own_sd_m: np.ndarray
+    slope_m: np.ndarray
+
+
+def round_hull(count):
+    """`Hull` of a circular wall at so many tangents."""
+    return Hull(*np.zeros((4, count)))
+
+
+def halfway(first, second):
+    """Mean of two `Hull`s of the same tangents."""
+    pairs = ((getattr(first, name), getattr(second, name)) for name in Hull.__annotations__)
+    return Hull(*((one + other) / 2 for one, other in pairs))
+
+
+@dataclass(frozen=True)
 class Touching:
     """Tangents as places of the wall.
 
@@ -113,9 +147,7 @@ class Touching:
         In the middle of the tank, about.
     seen_right : ndarray of bool, shape (n,)
         The limb that the sight passes at.
-    excess : tuple of float
-        By how much tangents stand outside the wall: mean, which was taken off, standard deviation
-        of that, and of those to one limb from a set-up beside it, m.
+    hull : Hull
     """
 
     points: Points
@@ -127,7 +159,7 @@ class Touching:
     length_m: np.ndarray
     origin_m: np.ndarray
     seen_right: np.ndarray
-    excess: tuple = (0.0, 0.0, 0.0)
+    hull: Hull
 
 
 def normals_of(azimuth_rad, is_right):
@@ -188,7 +220,7 @@ def _is_right(station_m, azimuth_rad, centre):
     return away[:, 0] * np.cos(azimuth_rad) - away[:, 1] * np.sin(azimuth_rad) < 0
 
 
-def touch(tangents, poses, *, zero_z_m, nominal_m, tools=(), excess=(0.0, 0.0, 0.0)):
+def touch(tangents, poses, *, zero_z_m, nominal_m, tools=(), hull=None):
     """`Touching` of tangents from known poses.
 
     Parameters
@@ -203,9 +235,10 @@ def touch(tangents, poses, *, zero_z_m, nominal_m, tools=(), excess=(0.0, 0.0, 0
     tools : tuple of (float, float)
         Standard deviation of scale and of offset (m) of each of the instruments, as they were known
         beforehand; nan: free.
-    excess : tuple of float
-        As in `Touching`.
+    hull : Hull, optional
+        None: the wall is circular.
     """
+    hull = round_hull(len(tangents)) if hull is None else hull
     pose = poses.place_of(tangents)
     azimuth = poses.orientation_rad[pose] + tangents.direction_rad
     station = poses.xyz_m[pose]
@@ -215,17 +248,22 @@ def touch(tangents, poses, *, zero_z_m, nominal_m, tools=(), excess=(0.0, 0.0, 0
     sight = np.column_stack([np.sin(azimuth), np.cos(azimuth)])
     length = np.sum((centre - local) * sight, axis=1)
     f, normal = normals_of(azimuth, seen)
-    z, by_zenith = _heights(tangents, station[:, 2], length, zero_z_m)
-    xyz = np.column_stack([station[:, :2] + length[:, None] * sight - excess[0] * normal, z])
+    # right limbs look towards falling azimuths, left limbs towards growing ones
+    to_wall = length + np.where(seen, -hull.slope_m, hull.slope_m)
+    z, by_zenith = _heights(tangents, station[:, 2], to_wall, zero_z_m)
+    xyz = np.column_stack(
+        [station[:, :2] + length[:, None] * sight - hull.excess_m[:, None] * normal, z]
+    )
     by = _by_poses(poses, pose, normal, np.where(seen, length, -length), by_zenith != 0)
     own = _own(tangents, length, by_zenith)
     causes = _causes(poses, by, tools)
-    shared = np.pad(-excess[1] * normal, ((0, 0), (0, 1))).ravel()
+    shared = np.pad(-hull.common_sd_m[:, None] * normal, ((0, 0), (0, 1))).ravel()
     covariance = scipy.linalg.block_diag(*own) + by @ poses.covariance @ by.T
-    bridged = excess[2] * _by_limbs(tangents, normal)
+    bridged = np.repeat(hull.own_sd_m, 3)[:, None] * _by_limbs(tangents, normal)
     covariance += bridged @ bridged.T
-    if excess[1]:
-        causes += (Cause("", "tangent_excess", 1e3 * excess[1], "mm", shared),)
+    if hull.common_sd_m.any():
+        size_mm = 1e3 * float(hull.common_sd_m.mean())
+        causes += (Cause("", "tangent_excess", size_mm, "mm", shared),)
         covariance += np.outer(shared, shared)
     count, rows = len(tangents), tangents.rows or range(1, len(tangents) + 1)
     points = Points(
@@ -254,7 +292,7 @@ def touch(tangents, poses, *, zero_z_m, nominal_m, tools=(), excess=(0.0, 0.0, 0
         length_m=length,
         origin_m=origin,
         seen_right=seen,
-        excess=tuple(excess),
+        hull=hull,
     )
 
 

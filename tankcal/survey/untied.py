@@ -2,12 +2,14 @@
 
 Each sees a part of the wall, a generatrix at least. From its own hits it has the axis of the tank
 at some distance and direction; its azimuth round the tank is that of its station, or even in the
-order of the hits. Then all untied poses are fitted together to a leaning surface of revolution with
-a radius of its own at each level,
+order of the hits. Then all untied poses are fitted together to a leaning surface with a radius of
+its own at each level, and with the waves of settlement, which grow in proportion to the height,
 
-    |hit - axis(z)| = R_level,   axis(z) = (x, y) + (mx, my) z,
+    |hit - axis(z)| = R_level + (z - foot) / height * sum of (a_k cos kf + b_k sin kf),
+    axis(z) = (x, y) + (mx, my) z,
 
-what nothing determines staying where it is. The wall itself then has them as unknowns.
+f the azimuth about the axis; what nothing determines stays where it is. The wall itself then has
+the poses as unknowns.
 
 A shell that leans tells in which order they stand round it: the other way round they see it lean to
 as many sides. So an order that was only assumed is that of the better fit, clockwise or not, and
@@ -21,6 +23,7 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.geometry.circles import taubin_circle
+from tankcal.geometry.field.components import SETTLEMENT_MODES
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
 from tankcal.survey.sighting import certified_m, rays
@@ -30,6 +33,7 @@ NARROW_RAD = 0.1  # directions of a set-up that sees a line of the wall, and loo
 START_SDS = (0.3, 0.3, 0.1)  # away from the axis, across, m, and turn, rad: of a pose at first
 START_OF_LINE = (0.3, 1e-3, 1e-3)  # of one that sees a line
 AXIS_SDS = (0.3, 0.3, 0.02, 0.02)  # m, and m/m of its lean
+SETTLEMENT_SD_M = 0.02  # of the waves of each mode of settlement at the top
 WALL_SD_M, FAR_SDS = 0.005, 3.0  # of a hit from that surface; further ones weigh less
 ROUNDS, CENTRE_ROUNDS = 15, 20
 MIRRORED, EXCHANGED = 1.15, 1.3  # times the rms of that order (sound ones: 1.02, 1.13): refused
@@ -183,7 +187,7 @@ def _centre(own, nominal_m, is_inside):
 
 
 def _fitted(poses, own, pose, untied, axis):
-    """The poses after least squares on a leaning surface of revolution, and the rms of the hits
+    """The poses after least squares on the leaning surface of the heading, and the rms of the hits
     about it, none more than FAR_SDS of a wall's, m.
     """
     z = poses.xyz_m[pose, 2] + own[:, 2]
@@ -193,44 +197,51 @@ def _fitted(poses, own, pose, untied, axis):
     level[order] = np.cumsum(np.diff(z[order], prepend=z[order[0]]) > LEVEL_GAP_M)
     place = {one: i for i, one in enumerate(untied)}
     free, levels = 3 * len(untied), level.max() + 1
-    prior = np.diag(np.concatenate([np.ones(free), AXIS_SDS]) ** -2.0)
+    settled = np.full(2 * len(SETTLEMENT_MODES), SETTLEMENT_SD_M)
+    prior = np.diag(np.concatenate([np.ones(free), AXIS_SDS, settled]) ** -2.0)
     for one, i in place.items():
         prior[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = _start(
             poses.xyz_m[one, :2] - axis, own[pose == one]
         )
-    shift, lean = np.zeros(2), np.zeros(2)
+    shift, lean, waves = np.zeros(2), np.zeros(2), np.zeros(2 * len(SETTLEMENT_MODES))
     xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
-    moved = np.zeros(free + 4)
+    up = (z - z.min()) / max(np.ptp(z), LEVEL_GAP_M)
+    first, known = free + 4, free + 4 + len(waves)
+    moved = np.zeros(known)
     for _ in range(ROUNDS):
         turned = _turned(own, zero[pose])
         away = xyz[pose, :2] + turned - axis - shift - np.outer(z - middle, lean)
         distance = np.hypot(*away.T)
         normal = away / distance[:, None]
-        by = np.zeros((len(z), free + 4 + levels))
+        by = np.zeros((len(z), known + levels))
         for one, i in place.items():
             mine = pose == one
             by[mine, 3 * i : 3 * i + 2] = normal[mine]
             across = np.column_stack([turned[mine, 1], -turned[mine, 0]])
             by[mine, 3 * i + 2] = np.sum(normal[mine] * across, axis=1)
         by[:, free : free + 2] = -normal
-        by[:, free + 2 : free + 4] = -normal * (z - middle)[:, None]
-        by[np.arange(len(z)), free + 4 + level] = -1.0
-        radii = np.array([np.median(distance[level == one]) for one in range(levels)])
-        off = distance - radii[level]
+        by[:, free + 2 : first] = -normal * (z - middle)[:, None]
+        f = np.multiply.outer(np.arctan2(*away.T), SETTLEMENT_MODES)
+        by[:, first:known] = -up[:, None] * np.hstack([np.cos(f), np.sin(f)])
+        by[np.arange(len(z)), known + level] = -1.0
+        round_m = distance + by[:, first:known] @ waves
+        radii = np.array([np.median(round_m[level == one]) for one in range(levels)])
+        off = round_m - radii[level]
         spread = max(WALL_SD_M, 1.4826 * float(np.median(np.abs(off))))
         weight = np.minimum(1.0, FAR_SDS * spread / np.maximum(np.abs(off), 1e-12)) / spread**2
         normals = by.T @ (weight[:, None] * by)
-        normals[: free + 4, : free + 4] += prior
+        normals[:known, :known] += prior
         right = -by.T @ (weight * off)
-        right[: free + 4] -= prior @ moved
+        right[:known] -= prior @ moved
         change = np.linalg.solve(normals, right)
         for one, i in place.items():
             xyz[one, :2] += change[3 * i : 3 * i + 2]
             zero[one] += change[3 * i + 2]
         shift += change[free : free + 2]
-        lean += change[free + 2 : free + 4]
-        moved += change[: free + 4]
-        if np.abs(change[: free + 4]).max() < 1e-7:
+        lean += change[free + 2 : first]
+        waves += change[first:known]
+        moved += change[:known]
+        if np.abs(change[:known]).max() < 1e-7:
             break
     misfit = np.sqrt(np.mean(np.minimum(np.abs(off), FAR_SDS * WALL_SD_M) ** 2))
     return replace(poses, xyz_m=xyz, orientation_rad=zero), float(misfit)

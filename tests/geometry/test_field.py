@@ -12,6 +12,7 @@ from tankcal.geometry.field.amplitudes import Amplitudes, assumed_amplitudes, es
 from tankcal.geometry.field.cells import cells_of, sites_of_cells
 from tankcal.geometry.field.components import (
     COMPONENTS,
+    Heights,
     azimuth_correlations,
     joint_profiles,
     log_covariance,
@@ -80,12 +81,14 @@ SPREAD = [one for one in COMPONENTS if one.shape != "weld"]
 @pytest.mark.parametrize("one", SPREAD, ids=lambda one: one.name)
 def test_a_component_of_unit_variance_has_unit_rms(one):
     node, weight = np.polynomial.legendre.leggauss(200)
-    there = np.array([one.height_covariance(np.array([z]), np.array([z]))[0, 0] for z in node])
+    heights = Heights(node, (node + 1) / 2)  # of a shell of one course
+    there = one.height_between(heights, heights)
     assert weight @ there / 2 == pytest.approx(1.0, rel=2e-3)
     same = azimuth_correlations(np.zeros(1), np.zeros(1), RADIUS_M)[one.shape][0, 0]
     assert same == pytest.approx(1.0)
     if one.shape == "mean" and one.orders != "joints":
-        assert weight @ one.height_covariance(node, np.array([0.3]))[:, 0] == pytest.approx(0.0)
+        at_one = Heights(np.array([0.3]), np.array([0.65]))
+        assert weight @ one.height_covariance(heights, at_one)[:, 0] == pytest.approx(0.0)
 
 
 def test_profiles_of_joints_have_no_mean():
@@ -94,7 +97,7 @@ def test_profiles_of_joints_have_no_mean():
 
 
 def test_sizes_of_joints_and_seams_are_more_alike_than_others():
-    """By hand: 0.05 of any two, and 0.09 more of what welds make."""
+    """By hand: 0.05 of any two, 0.09 more of what welds make, none with settlement."""
     covariance, names = log_covariance(), [one.name for one in COMPONENTS]
     sd = np.sqrt(np.diag(covariance))
     assert sd == pytest.approx([one.log_sd for one in COMPONENTS])
@@ -104,6 +107,7 @@ def test_sizes_of_joints_and_seams_are_more_alike_than_others():
     )
     assert alike[joints, [bulge, dents]] == pytest.approx([0.05, 0.14])
     assert alike[bulge, dents] == pytest.approx(0.05)
+    assert np.delete(alike[names.index("settlement")], names.index("settlement")).max() == 0.0
     assert np.linalg.eigvalsh(covariance)[0] > 0.5
 
 
@@ -186,6 +190,16 @@ def test_courses_err_alike_as_far_as_their_columns_do(turned):
     assert np.sqrt(np.diag(found)) == pytest.approx(one_m)
 
 
+def test_seams_between_columns_do_not_depend_on_where_azimuths_count_from():
+    """Property: uneven columns in three courses, turned by any angle, have one covariance."""
+    rng, course = np.random.default_rng(3), np.repeat([0, 1, 2], [24, 31, 400])
+    azimuth = rng.uniform(0, FULL_TURN, len(course))
+    found = hidden_covariance_m2(course, azimuth, 6.5)
+    for turn in (1e-4, 0.37, 2.0, 5.1):
+        turned = hidden_covariance_m2(course, (azimuth + turn) % FULL_TURN, 6.5)
+        assert turned == pytest.approx(found, abs=1e-10 * found.max())
+
+
 def test_a_dense_ring_helps_its_own_course_alone():
     """24 columns in three courses, and 300 points more in one of them."""
     even, dense = FULL_TURN * np.arange(24) / 24, FULL_TURN * np.arange(300) / 300
@@ -211,10 +225,12 @@ def dense(field, zeta):
     n, many = len(field.sites), 3 * len(zeta)
     course = np.concatenate([sites.course, np.repeat(range(3), len(zeta))])
     height = np.concatenate([sites.zeta, np.tile(zeta, 3)])
+    part_of_shell = (course + (height + 1) / 2) / 3  # three courses of one height
     turn = np.subtract.outer(sites.azimuth_rad, sites.azimuth_rad)
-    along = {name: np.zeros((n + many, n + many)) for name in ("oval", "seam")}
+    along = {name: np.zeros((n + many, n + many)) for name in ("oval", "settled", "seam")}
     seam = (1 + (k * 0.4 / field.nominal_m) ** 2) ** -2.0
-    for name, weights in (("oval", k**-3.0 * (k <= 36)), ("seam", seam)):
+    spectra = ("oval", k**-3.0 * (k <= 36)), ("settled", 1.0 * (k <= 6)), ("seam", seam)
+    for name, weights in spectra:
         used = weights > 0
         waves = sum(w * np.cos(m * turn) for m, w in zip(k[used], weights[used], strict=True))
         rest = weights[-1] * k[-1] / 3  # of the modes beyond, where they add up: at one azimuth
@@ -234,7 +250,8 @@ def dense(field, zeta):
             columns = every if one.common else peaks
             whole += size * columns @ columns.T
             continue
-        part = size * along[one.shape] * one.height_covariance(height, height)
+        up = one.height_covariance(Heights(height, part_of_shell), Heights(height, part_of_shell))
+        part = size * along[one.shape] * up
         whole += part if one.common else part * same
     free = (course[:, None] == range(3)).astype(float)
     centre = np.zeros((n + many, 2 * (sites.ring.max() + 1)))
@@ -441,7 +458,8 @@ def test_walls_drawn_from_the_components_are_held(figure):
     for one, own in zip(COMPONENTS, size, strict=True):
         if one.shape == "weld":  # no weld is known here
             continue
-        part = own * along[one.shape] * one.height_covariance(height, height)
+        heights = sites.heights_at(course, height)
+        part = own * along[one.shape] * one.height_covariance(heights, heights)
         whole += part if one.common else part * (course[:, None] == course)
     values, vectors = np.linalg.eigh(whole)
     walls = vectors * np.sqrt(np.maximum(values, 0)) @ rng.normal(size=(len(turn), 2000))

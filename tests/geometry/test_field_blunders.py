@@ -47,7 +47,7 @@ def written_out(sites, variances_m2):
             columns = peaks.sum(axis=1, keepdims=True) if one.common else peaks
             whole += size * columns @ columns.T
             continue
-        part = size * along[one.shape] * one.height_covariance(sites.zeta, sites.zeta)
+        part = size * along[one.shape] * one.height_covariance(sites.heights, sites.heights)
         whole += part if one.common else part * same
     return whole
 

@@ -59,6 +59,7 @@ def test_values_and_their_doubt_by_conditioning():
             np.append(field.sites.azimuth_rad, spots.azimuth_rad),
             np.append(field.sites.leans, np.zeros(count, dtype=bool)),
             field.sites.welds_rad,
+            spans=field.sites.spans,
         )
         sizes = field.amplitudes.variances_m2
         prior = Covariances(both, RADIUS_M).total(sizes)

@@ -120,5 +120,8 @@ def test_the_excess_of_generated_walls_is_within_its_standard_uncertainty(tmp_pa
     held = [np.mean(one < 1.96) for one in away]
     figure("the same over its standard uncertainty, rms", f"{parts[0]:.2f} {parts[1]:.2f}")
     figure("the same, held", f"{held[0]:.2f} {held[1]:.2f}")
-    assert parts[0] < 1.8  # 1 but for single seams narrower than the points are apart
-    assert held[0] >= max(0.85, held[1])
+    # one shell has a seam narrower than the points are apart: no point shows it, and its excess is
+    # missed by so many ppm; all others are well within their uncertainty
+    assert np.sqrt(np.mean(np.sort(away[0])[:-1] ** 2)) < 1.0
+    assert np.abs(mean - truth).max() < 150e-6
+    assert held[0] >= max(0.95, held[1])

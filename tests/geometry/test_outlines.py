@@ -1,4 +1,4 @@
-"""Outlines: interpolated and smoothed, their derivatives, their components and their coverage."""
+"""Outlines: their derivatives, their components and their coverage."""
 
 from dataclasses import replace
 
@@ -6,16 +6,12 @@ import numpy as np
 import pytest
 from draws import draws
 from jacobians import assert_derivative
+from scipy.interpolate import CubicSpline
 from shapes import azimuths, modes, ring
 
 from tankcal.errors import SolutionError
 from tankcal.geometry.form import HARMONICS, harmonics, mode_variances
-from tankcal.geometry.outlines import (
-    evenly_spread,
-    interpolate_outline,
-    polar,
-    smooth_outline,
-)
+from tankcal.geometry.outlines import polar, smooth_outline
 
 
 def smooth_level(xy_m, noise_m2, form_m2):
@@ -29,12 +25,12 @@ def outlines(seed=1):
     even = ring(shape, azimuths(24, 0.2, rng))[:, :2]
     scattered = ring(shape, np.sort(rng.uniform(0, 2 * np.pi, 60)))[:, :2]
     return {
-        "interpolated": interpolate_outline(even, 0.0, 0.0, 0.0),
-        "smoothed": smooth_level(scattered, np.full(60, 1e-6), 1e-3),
+        "even": smooth_level(even, np.full(24, 1e-6), 1e-3),
+        "scattered": smooth_level(scattered, np.full(60, 1e-6), 1e-3),
     }
 
 
-@pytest.mark.parametrize("kind", ["interpolated", "smoothed"])
+@pytest.mark.parametrize("kind", ["even", "scattered"])
 def test_the_derivative_by_azimuth(kind):
     outline = outlines()[kind]
     for azimuth in (0.3, 3.9, 6.2):
@@ -42,7 +38,7 @@ def test_the_derivative_by_azimuth(kind):
         assert_derivative(outline.radius_m, [azimuth], slope[:, None], tolerance=1e-6)
 
 
-@pytest.mark.parametrize("kind", ["interpolated", "smoothed"])
+@pytest.mark.parametrize("kind", ["even", "scattered"])
 def test_an_outline_closes(kind):
     outline = outlines()[kind]
     for derivative in (0, 1):
@@ -50,9 +46,13 @@ def test_an_outline_closes(kind):
         assert start == pytest.approx(end, abs=1e-7)
 
 
-def test_interpolation_goes_through_every_point():
-    outline = outlines()["interpolated"]
-    assert outline.radius_m(outline.knots_rad) == pytest.approx(outline.parameters, abs=1e-13)
+def test_an_outline_goes_through_points_without_error():
+    rng = np.random.default_rng(5)
+    shape, _ = modes(6.5, 2, rng.normal(0, 0.01, 4), rng.normal(0, 0.01, 4))
+    xy = ring(shape, azimuths(24, 0.2, rng))[:, :2]
+    outline = smooth_level(xy, np.full(24, 1e-12), 1e-3)
+    azimuth, radius = polar(xy, 0.0, 0.0)
+    assert outline.radius_m(azimuth) == pytest.approx(radius, abs=1e-7)
 
 
 def test_smoothing_recovers_low_modes_of_perfect_points():
@@ -66,29 +66,15 @@ def test_smoothing_recovers_low_modes_of_perfect_points():
 
 
 def test_modes_of_an_oval():
+    """Closed form: 24 even points show modes 2, 22 and 26 alike; each has its share k^-3."""
     shape, _ = modes(6.5, 2, np.array([0.02]), np.array([-0.01]))
-    outline = interpolate_outline(ring(shape, azimuths(24))[:, :2], 0.0, 0.0, 0.0)
+    outline = smooth_level(ring(shape, azimuths(24))[:, :2], np.full(24, 1e-10), 1e-3)
     assert outline.modes_m()[0, 0] == pytest.approx(6.5, abs=1e-7)
-    assert outline.modes_m()[2] == pytest.approx([0.02, -0.01], abs=1e-5)
+    share = 2.0**-3 / (2.0**-3 + 22.0**-3 + 26.0**-3)
+    assert outline.modes_m()[2] == pytest.approx([0.02 * share, -0.01 * share], abs=1e-7)
 
 
-def test_even_spread_is_recognised():
-    rng = np.random.default_rng(1)
-    assert evenly_spread(azimuths(24))
-    assert evenly_spread(azimuths(24, 0.2, rng))
-    assert not evenly_spread(np.delete(azimuths(24), 7))  # one generatrix is missing
-    assert not evenly_spread(np.append(azimuths(24), 0.001))
-    assert not evenly_spread(azimuths(4))
-    assert not evenly_spread(azimuths(1000))
-
-
-def test_a_shared_azimuth_cannot_be_interpolated():
-    xy = ring(6.5, np.append(azimuths(8), 0.0))[:, :2]
-    with pytest.raises(SolutionError, match="share an azimuth"):
-        interpolate_outline(xy, 0.0, 0.0, 0.0)
-
-
-@pytest.mark.parametrize("kind", ["interpolated", "smoothed"])
+@pytest.mark.parametrize("kind", ["even", "scattered"])
 def test_unseen_form_equals_effect_of_one_mode(kind):
     """Second method: fit the same azimuths to a shape that holds the mode."""
     plain = outlines()[kind]
@@ -161,6 +147,14 @@ def test_a_smoothed_area_is_covered_by_its_uncertainty_study(figure):
     assert abs(part - 0.95) < 3 * np.sqrt(0.95 * 0.05 / tanks)
 
 
+def area_of_spline(azimuth, radius):
+    """Area within the periodic cubic spline through points of ascending azimuths."""
+    around = np.append(azimuth, azimuth[0] + 2 * np.pi)
+    spline = CubicSpline(around, np.append(radius, radius[0]), bc_type="periodic")
+    even = azimuth[0] + np.arange(7200) * np.pi / 3600
+    return np.pi * np.mean(spline(even) ** 2)
+
+
 def bridged(sections, noise):
     """Area errors of 23 of 24 generatrices: by the spline, and by the spectrum of the form."""
     rng = np.random.default_rng(9)
@@ -171,17 +165,17 @@ def bridged(sections, noise):
     for _ in range(sections):
         wave = rng.normal(size=398) * sd
         xy = ring(6.5 + waves @ wave + rng.normal(0, noise, 23), azimuth)[:, :2]
-        spline = interpolate_outline(xy, 0.0, 0.0, form_m2)
+        spline = area_of_spline(*polar(xy, 0.0, 0.0))
         smooth = smooth_level(xy, np.full(23, noise**2), form_m2)
         truth = np.pi * 6.5**2 + np.pi / 2 * wave @ wave
-        errors.append([spline.area_m2() - truth, smooth.area_m2() - truth])
+        errors.append([spline - truth, smooth.area_m2() - truth])
     return np.array(errors)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.001, 0.014])
 def test_a_missing_generatrix_is_bridged_better_by_the_spectrum(noise, figure):
-    """Simulation, 400 sections with form of 20 mm rms: the reason for the limit of 1.5 spacings."""
+    """Simulation, 400 sections with form of 20 mm rms: the reason why no outline is a spline."""
     errors = bridged(400, noise)
     rms = 1e6 * np.sqrt(np.mean(errors**2, axis=0)) / (np.pi * 6.5**2)
     figure(

@@ -49,9 +49,10 @@ def test_no_point_is_rejected(example_result):
     assert len(example_result.wall.accepted) == 24 * 5 - 1  # published: section 3 has 23 points
 
 
-def test_nothing_is_left_to_be_warned_of(example_result):
-    """A shop window: everything is declared that the certificate asks for."""
-    assert example_result.warnings == ()
+def test_warnings_name_the_sections_alone(example_result):
+    """Everything is declared that the certificate asks for; the published scatter is not even."""
+    codes = [one.expected.code for one in example_result.warnings]
+    assert codes == ["sections_inhomogeneous", "sections_off_stated"]
     assert certificate.statements(Paper(record_of(example_result))).data["items"][2:] == []
 
 

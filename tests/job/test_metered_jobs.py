@@ -226,12 +226,21 @@ def meter(key, value):
     return lambda parts: parts.registers["meters"]["M"].update({key: value})
 
 
+def rest_without_time(parts):
+    """A dip at rest whose time, and hence whose duration, is not known."""
+    for name, value in {"use": "rest", "volume_m3": 0.0, "time": None}.items():
+        spoil(parts, 3, name, value)
+
+
 SLIPS = [
     (cell(1, "volume_m3", 39.8), (ROWS, 2, "volume_m3"), "run_without_start"),
     (cell(1, "use", "check"), (ROWS, 2, "use"), "start_not_used"),
     (cell(3, "dip_m", None), (ROWS, 4, "dip_m"), "dip_missing_in_run"),
     (lambda parts: drop(parts, "dip_m"), (ROWS, None, "dip_m"), "column_missing_or"),
     (cell(3, "volume_m3", 0.0), (ROWS, 4, "volume_m3"), "batch_of_nothing"),
+    (cell(3, "use", "rest"), (ROWS, 4, "volume_m3"), "batch_at_rest"),
+    (cell(1, "use", "rest"), (ROWS, 2, "use"), "start_not_used"),
+    (rest_without_time, (ROWS, 4, "time"), "rest_without_time"),
     (cell(8, "dip_m", 1.3), (ROWS, 9, "dip_m"), "dip_does_not_rise"),
     (cell(8, "volume_m3", -26.5), (ROWS, 9, "dip_m"), "dip_does_not_fall"),
     (cell(8, "run", "2"), (ROWS, 9, "volume_m3"), "run_without_start"),

@@ -108,6 +108,19 @@ def test_one_setup_gives_the_table(tmp_path):
     assert abs(offset.contribution) == pytest.approx(2 * 5e-4 / 6.5 * 1063, rel=0.12)
 
 
+def test_a_turned_circle_of_one_set_up_changes_nothing(tmp_path):
+    """Property: the zero of a single set-up's directions is a choice; U to 1e-9."""
+    first = run(tmp_path / "first", parts_of(tool=NOISY, seed=1))
+    for turn_deg in (0.37, 123.456):
+        parts = parts_of(tool=NOISY, seed=1)
+        place = parts.tables["wall_hits"][0].index("direction_deg")
+        for row in parts.tables["wall_hits"][1:]:
+            row[place] = (row[place] + turn_deg) % 360
+        turned = run(tmp_path / str(turn_deg), parts)
+        np.testing.assert_allclose(turned.table.volume_m3, first.table.volume_m3, rtol=1e-9)
+        np.testing.assert_allclose(turned.table.U_m3, first.table.U_m3, rtol=1e-9)
+
+
 @pytest.mark.slow
 def test_a_workbook_is_the_same_job(tmp_path):
     parts = parts_of(tool=NOISY, seed=1)

@@ -4,6 +4,7 @@ Kinds of truth: jobs simulated without the package (examples), a published pose 
 invariance, and the body's own differences.
 """
 
+import datetime
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +22,12 @@ from tankcal.pipeline.liquid import measure_by_liquid
 from tankcal.pipeline.liquid_adjustment import adjust_liquid
 from tankcal.pipeline.liquid_alone import geometry_alone, geometry_beside
 from tankcal.pipeline.liquid_body import join_body
+from tankcal.pipeline.liquid_checks import check_liquid_result
+from tankcal.pipeline.liquid_naming import is_steady_leak
 from tankcal.pipeline.surveying import find_survey
+from tankcal.record import record_of
+from tankcal.report import certificate
+from tankcal.report.paper import Paper
 from tankcal.uncertainty import combine
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -48,6 +54,67 @@ def test_examples_hold_what_is_true(example):
     for dip, volume in zip(truth["dip_m"], truth["volume_m3"], strict=True):
         found = result.at(dip)
         assert abs(found.value_m3 - volume) < found.U_m3
+
+
+def test_what_hides_is_what_an_error_of_that_size_does_to_the_table(upright):
+    """Second way: the job again with a hundredth of the error, of the meter and by a leak."""
+
+    def tables(job):
+        result = run(job)
+        table = result.liquid.tables["joint"]
+        return result, table.volume_m3, table.U_m3
+
+    result, volume, U = tables(upright)
+    told = [one for one in result.liquid.causes if one.undetected_U is not None]
+    of = {one.cause.kind: one for one in told if one.cause.of in ("M", None)}
+    metering, share = upright.liquid, 0.01
+    less = metering.volume_m3 / (1 + share * of["meter"].detectable)
+    seconds = [moment(one).timestamp() for one in metering.time]
+    hours = np.diff(seconds, prepend=seconds[0]) / 3600
+    hours[[rows[0] for rows in metering.runs.values()]] = 0.0
+    more = metering.volume_m3 + share * of["leak"].detectable * hours
+    for kind, shown in (("meter", less), ("leak", more)):
+        _, moved, _ = tables(replace(upright, liquid=replace(metering, volume_m3=shown)))
+        change = np.max(np.abs(moved - volume)[1:] / U[1:]) / share
+        assert of[kind].undetected_U == pytest.approx(change, rel=0.02)
+
+
+def moment(text):
+    return datetime.datetime.fromisoformat(str(text))
+
+
+@pytest.mark.parametrize(
+    ("w", "named", "told"),
+    [(3.5, False, True), (-3.5, False, True), (3.2, False, False), (4.5, True, False)],
+)
+def test_a_drift_with_time_has_a_test_of_its_own(upright, w, named, told):
+    """The limit is 3.29, of one test in a thousand; a named cause is told in another warning."""
+    found = run(upright).liquid
+    leak = replace(next(filter(is_steady_leak, found.causes)), w=w, size=0.05, is_named=named)
+    problems = check_liquid_result(upright, replace(found, causes=(leak,)))
+    assert ("liquid_drifts" in [one.expected.code for one in problems]) is told
+
+
+@pytest.mark.parametrize("proved", [False, True])
+def test_a_meter_that_nothing_checks_is_told(tmp_path, proved):
+    """One meter, by liquid alone: told in the run and on page 1, unless it was proved again."""
+    after = {"factor_after": 1.0006} if proved else {}
+    dips = [None, *np.round(np.arange(0.3, 3.1, 0.3), 2).tolist()]
+    job = metered_job("vertical", tmp_path / "job", dips=dips, registers=after)
+    result = run(fill(np.random.default_rng(8), job, NOMINAL["vertical"], 9.5))
+    told = [one for one in result.warnings if one.expected.code == "meter_unchecked"]
+    assert [(one.file, one.column) for one in told] == (
+        [] if proved else [("meters.toml", "M.factor_after")]
+    )
+    record = record_of(result)
+    controls = {one["kind"]: one for one in record["liquid"]["controls"]}
+    assert controls["meter"]["of"] == "M"
+    assert controls["meter"]["undetected_U"] > 2
+    page_1 = [block.data for block in certificate.doubtful_input(Paper(record))]
+    assert page_1[0] == {"kind": "notice", "text": "NOT CHECKED"}
+    lines = page_1[1]["items"]
+    assert any("factor of meter M" in one for one in lines) is not proved
+    assert any("leak below" in one for one in lines)  # no dip was read at rest
 
 
 def test_pose_of_a_lying_tank_from_dips_and_litres(tmp_path):

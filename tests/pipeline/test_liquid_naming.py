@@ -12,8 +12,9 @@ from metered_runs import Fault, fill, metered_job
 
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.liquid_adjustment import adjust_liquid
+from tankcal.pipeline.liquid_alone import geometry_alone
 from tankcal.pipeline.liquid_geometry import Geometry
-from tankcal.pipeline.liquid_naming import alternatives_of
+from tankcal.pipeline.liquid_naming import alternatives_of, is_steady_leak
 from tankcal.pipeline.nominal_wall import find_nominal_wall
 from tankcal.tank.liquid import name_causes
 from tankcal.tank.solids import LyingTank
@@ -104,12 +105,48 @@ def told(job, truth, fault, rng):
         filled = spoilt_sizes(filled, fault.size)
     survey = find_nominal_wall(filled) if filled.horizontal is None else None
     found = adjust_liquid(Geometry(filled, survey))
-    named = [one for one in name_causes(found.adjusted, alternatives_of(found)) if one.is_named]
+    named = [one for one in name_causes_of(found) if one.is_named]
     of = int(filled.liquid.row[fault.place]) if fault.kind in ("dip", "batch") else None
     right = any(
         one.cause.kind == fault.kind and (of is None or one.cause.of == of) for one in named
     )
     return len({one.cause.kind for one in named}), right
+
+
+def steady_leak(job, fault, survey):
+    """(named, verdict) of a leak in all runs, of one job by liquid alone."""
+    rng = np.random.default_rng(4)
+    filled = fill(rng, job, *upright_truth(rng), fault)
+    verdicts = name_causes_of(adjust_liquid(geometry_alone(filled, survey)))
+    return any(one.is_named for one in verdicts), next(filter(is_steady_leak, verdicts))
+
+
+def name_causes_of(found):
+    return name_causes(found.adjusted, alternatives_of(found))
+
+
+def test_hours_at_rest_separate_a_leak_from_the_meter(tmp_path):
+    """Simulation: 0.1 m3/h beside liquid alone, steps of one duration; 12 h at rest, twice a run.
+
+    Without rest a leak grows with the volume, as radii and the meter do. At rest it is the fall of
+    the level alone: its sd is that of the two dips, their temperatures and the hours between them.
+    """
+    dips = [None, *np.round(np.arange(0.3, 9.4, 0.5), 2).tolist()]
+    rest = [None, 0.3, *dips[1:], dips[-1]]
+    leak = Fault("leak", 0.1)
+    outcomes = {}
+    for name, of_run in (("moving", dips), ("rest", rest)):
+        job = metered_job("vertical", tmp_path / name, dips=of_run, registers=METER, **LIQUID)
+        survey = find_nominal_wall(job)
+        outcomes[name] = steady_leak(job, leak, survey)
+        assert not steady_leak(job, Fault(), survey)[0]
+    assert not outcomes["moving"][0]
+    assert outcomes["moving"][1].detectable > 1.0
+    named, found = outcomes["rest"]
+    assert named
+    assert found.size == pytest.approx(0.1, abs=4 * found.sd)
+    fall = np.sqrt(2) * np.pi * 6.5**2 * 0.0003 / 12 / np.sqrt(4)  # four rests: dips alone
+    assert 0.8 * fall < found.sd < 1.5 * fall
 
 
 KINDS = {"upright": (upright_job, upright_truth), "lying": (lying_job, lying_truth)}

@@ -10,6 +10,7 @@ from job_builder import job_parts, write_folder
 from ringed_jobs import reading_of, ringed_parts
 
 import tankcal
+from tankcal.geometry.field.components import COMPONENTS
 from tankcal.pipeline.ring_checks import exchanged_rings
 from tankcal.pipeline.ringed_wall import find_ringed_wall
 from tankcal.pipeline.tanks import body_of
@@ -101,6 +102,20 @@ def test_every_cause_stands_in_the_budget(tmp_path):
         *("ovality", "seams", "ring_lengths", "ring_axes", "tilt", "dip_position"),
         "plate_thickness",
     }
+
+
+def test_a_ring_is_assumed_to_bulge_less_than_a_course_of_a_large_tank(tmp_path):
+    """Truth: the square root of the radius, from R 7.5 m down, but for what welds draw in."""
+    found = []
+    for radius in (0.8, 1.8):
+        parts = ringed_parts((radius,) * 3, horizontal__tilt_mm_per_m=0.0)
+        wall = find_ringed_wall(tankcal.load(write_folder(tmp_path / str(radius), parts)), str)
+        sizes = wall.field.amplitudes.likely_m2 / [one.median_m**2 for one in COMPONENTS]
+        found.append(dict(zip([one.name for one in COMPONENTS], sizes, strict=True)))
+        assert found[-1]["common bulge"] == pytest.approx(radius / 7.5, rel=0.3)
+        assert found[-1]["drawn-in joints"] == pytest.approx(1.0, rel=0.3)
+    grown = found[1]["common bulge"] / found[0]["common bulge"]
+    assert grown == pytest.approx(1.8 / 0.8, rel=0.1)
 
 
 def test_ovality_moves_the_middle_and_hardly_the_top(tmp_path):

@@ -105,7 +105,7 @@ def test_exact_tangents_give_the_table(tmp_path, radius, figure):
     result = run(tmp_path, parts_of(sights(radius, Circle(), steps=2000), seed=None))
     off = result.table.volume_m3[-1] / inside_of(radius) - 1
     figure(f"volume by exact tangents, {radius.__name__}", f"{1e6 * off:+.2f} ppm")
-    mean, common, _ = result.touching.excess
+    mean, common = result.touching.hull.excess_m.mean(), result.touching.hull.common_sd_m.mean()
     assert abs(off) < 5e-7 + 2 * (2 * common) / 6.5
     assert mean < 5e-5
     assert len(result.accepted) == 128

@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 
 from tankcal.geometry.field.amplitudes import Amplitudes
 from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES
-from tankcal.geometry.girth import _support_at, tangent_excess
+from tankcal.geometry.girth import Ring, _support_at, tangent_excess
 from tankcal.geometry.support import fit_support, support_columns
 from tankcal.survey.measurements import Setup
 from tankcal.survey.sighting import NETWORK, Poses
@@ -169,15 +169,44 @@ def test_excess_of_convex_walls_is_that_of_the_perimeter():
     share = OVALITY_MODES**-3.0 / np.sum(OVALITY_MODES**-3.0)
     size = 3e-4
     expected = np.sum(OVALITY_MODES**2 * share) * size**2 / (2 * 6.5)
-    mean, common, own = tangent_excess(amplitudes_of(common_ovality=size), 6.5)
+    ((mean, common, own),) = tangent_excess(amplitudes_of(common_ovality=size), 6.5, [0.5])
     assert mean == pytest.approx(expected, abs=4 * common / 8)
     assert own > 0
-    assert tangent_excess(amplitudes_of(), 6.5)[0] < 1e-12
+    assert tangent_excess(amplitudes_of(), 6.5, [0.5])[0, 0] < 1e-12
+
+
+def test_excess_of_settlement_grows_with_the_square_of_the_height():
+    """Closed form: mean of p - R is sum k^2 c_k^2 / (4 R), c_k in proportion to the height."""
+    size, modes = 3e-4, np.arange(2.0, 7.0)
+    up = np.array([0.0, 0.3, 0.6, 1.0])
+    expected = 3 * up**2 * np.mean(modes**2) * size**2 / (2 * 6.5)
+    mean, common, _ = tangent_excess(amplitudes_of(settlement=size), 6.5, up).T
+    np.testing.assert_allclose(mean, expected, atol=4 * common[-1] / 8)
+    np.testing.assert_allclose(mean, mean[-1] * up**2, atol=1e-3 * mean[-1])
+
+
+def test_rings_bound_what_is_expected_beyond_them():
+    """A property: the likeliest outline of many exact radii has all of the excess."""
+    turn = 2 * np.pi * np.arange(96) / 96
+    radius = 6.5 + 0.004 * np.cos(3 * turn - 0.4)
+    rings = [Ring(turn, radius, 1e-12 * np.eye(96), up) for up in (0.2, 0.8)]
+    known = amplitudes_of(common_ovality=4e-3)
+    beyond = tangent_excess(known, 6.5, [0.5], rings)[0, 0]
+    assert beyond < 0.02 * tangent_excess(known, 6.5, [0.5])[0, 0]
+
+
+def test_no_wall_is_drawn_rougher_than_the_limbs_allow():
+    """A bound: amplitudes of 300 mm with limbs that show 3 mm give the excess of 3 mm."""
+    rough, bounded = amplitudes_of(common_ovality=0.3), amplitudes_of(common_ovality=3e-3)
+    found = tangent_excess(rough, 6.5, [0.5], most_m=3e-3)
+    assert found == pytest.approx(tangent_excess(bounded, 6.5, [0.5]), rel=1e-9)
 
 
 def test_excess_over_valleys_is_less_than_that_of_convex_walls():
     """A property: the hull bridges valleys, so the quadratic formula is too much of them."""
-    found = [tangent_excess(amplitudes_of(common_seams=s), 6.5)[0] / s**2 for s in (5e-4, 8e-3)]
+    found = [
+        tangent_excess(amplitudes_of(common_seams=s), 6.5, [0.5])[0, 0] / s**2 for s in (5e-4, 8e-3)
+    ]
     assert found[1] < found[0]
 
 

@@ -5,12 +5,12 @@ the highest density given the readings (`likelihood`), and the curvature there i
 known.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tankcal.geometry.field.components import COMPONENTS, log_covariance
-from tankcal.geometry.field.evidence import likelihood_of
+from tankcal.geometry.field.evidence import BULGES, likelihood_of
 from tankcal.geometry.field.likelihood import LEAST_M
 
 
@@ -42,6 +42,10 @@ class Amplitudes:
     def noise_dof(self):
         """Degrees of freedom of the noise's factor; inf where it was given."""
         return 2 / self.noise_log_sd**2 if self.noise_log_sd else np.inf
+
+    def with_bulges(self, scale):
+        """The same amplitudes, those of bulges and tapers times a scale."""
+        return replace(self, likely_m2=np.where(BULGES, scale**2, 1.0) * self.likely_m2)
 
     def assumed_share(self):
         """(components,) variance of each logarithm over what it was beforehand: 1 of an assumed

@@ -81,5 +81,6 @@ def sites_of_cells(sites, weights):
         leans=sites.leans[first],
         welds_rad=sites.welds_rad,
         points=(sites.course, sites.azimuth_rad),
+        spans=sites.spans,
         smoothed=sites.smoothed,
     )

@@ -13,6 +13,17 @@ so that its amplitude, the root of its variance, is the rms departure that it ma
 in all courses, or each course has its own. How large it is a survey tells in part; before it, the
 logarithm of the variance is normal: about that of `median_m`, with `log_sd`, and a shell that is
 large in one is more likely large in another (`log_covariance`).
+
+Settlement is the exception: its h depends on the height t above the foot of the whole shell (0 to
+1). A foundation that settles unevenly by u cos k a bends an open shell without stretching it. The
+radius then changes by
+
+    k^2 z / R * u cos k a,
+
+which grows in proportion to the height z, so h(t, t') = 3 t t', of mean 1 over the shell. The
+amplitudes u of a foundation fall with k and the factor k^2 grows, so modes 2 to 6 have equal
+variances. That the shell is not stretched follows from w_k = k v_k and v_k' = k u_k / R of the
+radial, circumferential and vertical displacements w, v, u of mode k.
 """
 
 from dataclasses import dataclass
@@ -27,6 +38,8 @@ OVALITY_MODES = np.arange(2.0, 37.0)
 OVALITY_WEIGHTS = OVALITY_MODES**-3 / np.sum(OVALITY_MODES**-3)
 SEAM_LENGTH_M = 0.4  # along the arc, of a seam's flank
 WELD_LENGTH_M = 0.2  # the same of a peak at a weld, which is 0.8 m wide in all
+SETTLEMENT_MODES = np.arange(2.0, 7.0)
+SETTLEMENT_WEIGHTS = np.full(len(SETTLEMENT_MODES), 1 / len(SETTLEMENT_MODES))
 JOINT_LENGTHS = (0.1, 0.25)  # of half a course: how far a joint draws the plate in
 LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
 BELL, BELL_SD = 1.0, 0.4  # of the way from a parabola to a plate whose joints do not turn
@@ -35,9 +48,29 @@ SHRINKAGE = 0.09  # the same, besides, of two that its welds make: joints and se
 
 _LEVEL = (1,)
 KINDS = ("bulge", "ovality", "seams")
+ROUND_SHAPES = ("oval", "settled", "seam")  # waves round the wall, random at every azimuth
 LARGEST_QUOTIENT = 110.0  # b of which exp(2 pi b) is still a number
 PIECE = 1 << 14  # correlations at once
 NOT_AROUND = 15.0  # exp(-15 pi) is rounding: of a seam that short nothing is left half a turn away
+
+
+@dataclass(frozen=True)
+class Heights:
+    """Heights of n places on a shell.
+
+    Attributes
+    ----------
+    zeta : ndarray, shape (n,)
+        Within the course, -1 at its bottom to +1 at its top.
+    up : ndarray, shape (n,)
+        Above the foot of the shell, as a part of its height, 0 to 1.
+    """
+
+    zeta: np.ndarray
+    up: np.ndarray
+
+    def __getitem__(self, chosen):
+        return Heights(self.zeta[chosen], self.up[chosen])
 
 
 @dataclass(frozen=True)
@@ -51,14 +84,16 @@ class Component:
         Its name in a budget.
     shape : str
         Along the azimuth: "mean" (none: the mean radius), "oval" (mode k of variance k^-3, from 2
-        on), "seam" (the spectrum (1 + (k SEAM_LENGTH_M / R)^2)^-2 from mode 2 on, cusps) or "weld"
-        (a narrow seam at each vertical weld whose azimuth is known; its amplitude is the peak's).
+        on), "settled" (modes 2 to 6 of equal variance), "seam" (the spectrum (1 + (k SEAM_LENGTH_M
+        / R)^2)^-2 from mode 2 on, cusps) or "weld" (a narrow seam at each vertical weld whose
+        azimuth is known; its amplitude is the peak's).
     common : bool
         The same in all courses.
     orders : tuple of float, str
         Variances of the Legendre polynomials 0, 1, ... in the height, up to a factor; "plate": of
         the profiles of `plate_profiles`; "joints": of those of `joint_profiles`; "local": the
-        covariance exp(-|zeta - zeta'| / LOCAL_LENGTH).
+        covariance exp(-|zeta - zeta'| / LOCAL_LENGTH); "growing": in proportion to the height above
+        the foot of the shell.
     median_m, log_sd : float
         Median of its amplitude, m, and standard deviation of the logarithm of its variance.
     declared_as : str
@@ -74,14 +109,16 @@ class Component:
     log_sd: float
     declared_as: str = ""
 
-    def height_columns(self, zeta):
-        """(n, r) columns whose products are h; not of a component that is local."""
+    def height_columns(self, heights):
+        """(n, r) columns whose products are h at `Heights`; not of a component that is local."""
+        if self.orders == "growing":
+            return np.sqrt(3.0) * heights.up[:, None]
         if self.orders == "joints":
-            return joint_profiles(zeta)
+            return joint_profiles(heights.zeta)
         if self.orders == "plate":
-            return plate_profiles(zeta)
+            return plate_profiles(heights.zeta)
         used, scale = self._scales
-        return legendre(zeta, used[-1])[:, used] * scale
+        return legendre(heights.zeta, used[-1])[:, used] * scale
 
     @cached_property
     def _scales(self):
@@ -91,32 +128,32 @@ class Component:
         used = np.flatnonzero(weights)
         return used, np.sqrt(weights[used])
 
-    def columns(self, waves, zeta):
-        """(n, k) columns whose products are the covariance, of a mean or an oval.
+    def columns(self, waves, heights):
+        """(n, k) columns whose products are the covariance, of a mean, an oval or a settlement.
 
-        waves  (n, 2 modes) `oval_columns`
+        waves  {shape: (n, 2 modes)} of `wave_columns`
         """
-        up = self.height_columns(zeta)
+        up = self.height_columns(heights)
         if self.shape == "mean":
             return up
-        return (waves[:, :, None] * up[:, None]).reshape(len(up), -1)
+        return (waves[self.shape][:, :, None] * up[:, None]).reshape(len(up), -1)
 
     @property
     def is_level(self):
         """The same at all heights of a course."""
         return self.orders == _LEVEL
 
-    def height_covariance(self, zeta, other):
-        """(n, m) h between heights (n,) and (m,) of a course."""
+    def height_covariance(self, heights, other):
+        """(n, m) h between `Heights` (n,) and (m,)."""
         if self.orders == "local":
-            return _fading(np.subtract.outer(zeta, other))
-        return self.height_columns(zeta) @ self.height_columns(other).T
+            return _fading(np.subtract.outer(heights.zeta, other.zeta))
+        return self.height_columns(heights) @ self.height_columns(other).T
 
-    def height_between(self, zeta, other):
-        """(n,) h between each height (n,) of a course and the other (n,) beside it."""
+    def height_between(self, heights, other):
+        """(n,) h between each of the `Heights` (n,) and its partner in the other (n,)."""
         if self.orders == "local":
-            return _fading(zeta - other)
-        return np.sum(self.height_columns(zeta) * self.height_columns(other), axis=1)
+            return _fading(heights.zeta - other.zeta)
+        return np.sum(self.height_columns(heights) * self.height_columns(other), axis=1)
 
 
 _FREE = (0, 0, *(order**-2.0 for order in range(2, 7)))
@@ -135,6 +172,7 @@ COMPONENTS = (
     Component("dents", "seams", "seam", False, "local", 2e-3, 1.2),
     Component("peaking", "seams", "weld", True, _LEVEL, 3e-3, 1.2),
     Component("own peaks", "seams", "weld", False, _LEVEL, 2e-3, 1.2),
+    Component("settlement", "ovality", "settled", True, "growing", 1.5e-3, 2.0),
 )
 
 
@@ -142,7 +180,8 @@ def log_covariance(smoothed=False):
     """(components, components) of the logarithms of the variances, before the survey.
 
     Plates that are badly rolled and fitted leave a shell that is rough in every way; what welds
-    draw in when they shrink is peaking at the vertical and banding at the girth ones. But limbs,
+    draw in when they shrink is peaking at the vertical and banding at the girth ones. Settlement is
+    due to the foundation, and is independent of the plates. But limbs,
     which pass over its valleys, and set-ups that nothing but the wall ties show every wall smoother
     than it is: of those (smoothed True) no size tells of another.
     """
@@ -150,7 +189,8 @@ def log_covariance(smoothed=False):
     if smoothed:
         return np.diag(log_sd**2)
     welded = np.array([one.kind == "seams" or one.orders == "joints" for one in COMPONENTS])
-    alike = WORKMANSHIP + SHRINKAGE * np.outer(welded, welded)
+    of_plates = np.array([one.shape != "settled" for one in COMPONENTS])
+    alike = np.outer(of_plates, of_plates) * (WORKMANSHIP + SHRINKAGE * np.outer(welded, welded))
     np.fill_diagonal(alike, 1.0)
     return alike * np.outer(log_sd, log_sd)
 
@@ -199,14 +239,20 @@ def joint_profiles(zeta):
     return (np.exp(-below / w) - mean) / np.sqrt(len(w) * square)
 
 
-def oval_columns(azimuth_rad):
-    """(n, 2 modes) columns whose products are c: mode k has the variance k^-3, k = 2..36.
+def wave_columns(azimuth_rad):
+    """{"oval", "settled": (n, 2 modes) columns whose products are c}.
 
-    nan: the mean of a whole turn, which has none of them.
+    Mode k has the variance k^-3, k = 2..36; modes 2 to 6 have equal ones. nan: the mean of a whole
+    turn, which has none of them.
     """
-    waves = np.hstack([one[:, 1:] for one in multiples(azimuth_rad, int(OVALITY_MODES[-1]))])
-    waves[~np.isfinite(azimuth_rad)] = 0.0
-    return waves * np.tile(np.sqrt(OVALITY_WEIGHTS), 2)
+    cosines, sines = multiples(azimuth_rad, int(OVALITY_MODES[-1]))
+    found = {}
+    for shape, weights in (("oval", OVALITY_WEIGHTS), ("settled", SETTLEMENT_WEIGHTS)):
+        modes = slice(1, 1 + len(weights))  # from k = 2 on
+        waves = np.hstack([cosines[:, modes], sines[:, modes]]) * np.tile(np.sqrt(weights), 2)
+        waves[~np.isfinite(azimuth_rad)] = 0.0
+        found[shape] = waves
+    return found
 
 
 def seam_correlation(difference_rad, radius_m, length_m=SEAM_LENGTH_M):
@@ -275,13 +321,14 @@ def weld_columns(azimuth_rad, welds_rad, radius_m):
 
 
 def mode_shares(modes, radius_m):
-    """{"oval", "seam": (k,) variance of the cosine and of the sine of each mode, from 2 on}.
+    """{"oval", "settled", "seam": (k,) variance of cosine and sine of each mode, from 2 on}.
 
     All modes of a shape add up to one.
     """
     b = radius_m / SEAM_LENGTH_M
     return {
         "oval": np.where(modes <= OVALITY_MODES[-1], modes**-3 / np.sum(OVALITY_MODES**-3), 0.0),
+        "settled": np.where(modes <= SETTLEMENT_MODES[-1], SETTLEMENT_WEIGHTS[0], 0.0),
         "seam": 2 / (modes**2 + b**2) ** 2 / _seam_sum(b),
     }
 
@@ -313,16 +360,14 @@ def _of_modes(b, turn):
 
 
 def azimuth_correlations(azimuth_rad, other_rad, radius_m):
-    """{"mean", "oval", "seam": (n, m) c} between azimuths (n,) and (m,); nan: a whole turn.
+    """{shape: (n, m) c} between azimuths (n,) and (m,); nan: a whole turn.
 
     The mean of a whole turn has none of the waves around it.
     """
     seams = seam_correlations(azimuth_rad, other_rad, radius_m)
-    return {
-        "mean": np.broadcast_to(1.0, seams.shape),
-        "oval": oval_columns(azimuth_rad) @ oval_columns(other_rad).T,
-        "seam": seams,
-    }
+    waves, others = wave_columns(azimuth_rad), wave_columns(other_rad)
+    products = {shape: waves[shape] @ others[shape].T for shape in waves}
+    return {"mean": np.broadcast_to(1.0, seams.shape), **products, "seam": seams}
 
 
 def seam_correlations(azimuth_rad, other_rad, radius_m):

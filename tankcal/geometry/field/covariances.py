@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
-from tankcal.geometry.field.components import COMPONENTS, oval_columns, seam_correlations
+from tankcal.geometry.field.components import COMPONENTS, seam_correlations, wave_columns
 from tankcal.geometry.field.sites import distinct_azimuths
 
 
@@ -127,11 +127,11 @@ class Covariances:
     @cached_property
     def _columns(self):
         """{component: (n, k) columns whose products are it}, of mean radii and of waves."""
-        waves = oval_columns(self.sites.azimuth_rad)
+        waves, heights = wave_columns(self.sites.azimuth_rad), self.sites.heights
         return {
-            index: one.columns(waves, self.sites.zeta)
+            index: one.columns(waves, heights)
             for index, one in enumerate(COMPONENTS)
-            if one.shape in ("mean", "oval")
+            if one.shape in ("mean", "oval", "settled")
         }
 
     def _up(self, common, variances_m2, members):
@@ -144,8 +144,11 @@ class Covariances:
 
     def _height(self, index, members):
         """h of one component between some sites; one number if it is level."""
-        one, zeta = COMPONENTS[index], self.sites.zeta[members]
-        return 1.0 if one.is_level else one.height_covariance(zeta, zeta)
+        one = COMPONENTS[index]
+        if one.is_level:
+            return 1.0
+        heights = self.sites.heights[members]
+        return one.height_covariance(heights, heights)
 
     def _seams(self, members):
         """c of seams between some sites."""

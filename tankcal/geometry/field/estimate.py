@@ -21,7 +21,12 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.geometry.field.amplitudes import Amplitudes
-from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, weld_columns
+from tankcal.geometry.field.components import (
+    COMPONENTS,
+    ROUND_SHAPES,
+    azimuth_correlations,
+    weld_columns,
+)
 from tankcal.geometry.field.covariances import Covariances, without_rounding
 from tankcal.geometry.field.hidden_seams import hidden_covariance_m2
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
@@ -30,7 +35,7 @@ from tankcal.geometry.outlines import FULL_TURN
 from tankcal.quadrature import panels
 
 LEVELS = 7  # of a course, at which its outlines are stated: Gauss levels
-SHAPES = ("mean", "oval", "seam", "weld")
+SHAPES = ("mean", *ROUND_SHAPES, "weld")
 GRID_M, FEWEST_OF_GRID = 0.1, 720  # along the arc, and azimuths, of outlines that are integrated
 
 
@@ -90,23 +95,28 @@ class WallField:
         for shape in self._to_grid:
             if shape not in self.stated:
                 continue
-            found += self._drawn(shape, zeta, slice(None), common=True)
             for course, members in enumerate(self._covariances.runs):
-                found[course] += self._drawn(shape, zeta, members, common=False)
+                heights = self.sites.heights_at(course, zeta)
+                if shape == "settled" or course == 0:  # the others are alike in all courses
+                    alike = self._drawn(shape, heights, slice(None), common=True)
+                found[course] += alike + self._drawn(shape, heights, members, common=False)
         if "weld" in self.stated:
             for i, at_grid in self.peaks_at_grid.items():
                 peaks = self._explained @ self._covariances.peaks[i]
                 found += self.amplitudes.variances_m2[i] * (at_grid @ peaks)[:, None]
         return found
 
-    def _drawn(self, shape, zeta, members, *, common):
-        """(k, g or 1) what some sites say of the components of one shape at heights (k,)."""
-        height = sum(
-            size * one.height_covariance(zeta, self.sites.zeta[members])
+    def _drawn(self, shape, heights, members, *, common):
+        """(k, g or 1) what some sites show of the components of one shape at `Heights` (k,)."""
+        of_sites = self.sites.heights[members]
+        parts = [
+            size * one.height_covariance(heights, of_sites)
             for one, size in zip(COMPONENTS, self.amplitudes.variances_m2, strict=True)
             if (one.shape, one.common) == (shape, common)
-        )
-        pull = height * self._explained[members]
+        ]
+        if not parts:
+            return 0.0
+        pull = sum(parts) * self._explained[members]
         if shape == "mean":
             return pull.sum(axis=1, keepdims=True)
         return pull @ self._covariances.at_sites(self._to_grid[shape], members).T
@@ -178,7 +188,7 @@ class WallField:
     @cached_property
     def _to_grid(self):
         found = azimuth_correlations(self.grid_rad, self._covariances.azimuths_rad, self.nominal_m)
-        for shape in ("oval", "seam"):  # no mode 0, nor one that the grid takes for it
+        for shape in ROUND_SHAPES:  # no mode 0, nor one that the grid takes for it
             found[shape] -= found[shape].mean(axis=0)
         return found
 
@@ -320,7 +330,8 @@ class Functionals:
         along = self._along[one.shape]
         for course, members in enumerate(field._members):
             chosen = slice(None) if one.common else members
-            height = one.height_covariance(gauss_heights(), sites.zeta[chosen])
+            levels = sites.heights_at(course, gauss_heights())
+            height = one.height_covariance(levels, sites.heights[chosen])
             found[course][:, chosen] = along[course][:, chosen] * height
         return field.amplitudes.variances_m2[index] * found.reshape(-1, len(sites))
 
@@ -336,9 +347,12 @@ class Functionals:
             return field.amplitudes.variances_m2[index] * peaks @ peaks.T
         count = len(field._members)
         along = self._along_each_other[one.shape]
-        same = np.ones((count, count)) if one.common else np.eye(count)
-        height = one.height_covariance(gauss_heights(), gauss_heights())
-        return field.amplitudes.variances_m2[index] * along * np.kron(same, height)
+        courses = np.repeat(np.arange(count), LEVELS)
+        levels = field.sites.heights_at(courses, np.tile(gauss_heights(), count))
+        height = one.height_covariance(levels, levels)
+        if not one.common:
+            height = height * np.equal.outer(courses, courses)
+        return field.amplitudes.variances_m2[index] * along * height
 
     @cached_property
     def _along_each_other(self):
@@ -346,7 +360,7 @@ class Functionals:
         field, gradients = self._field, self._gradients.reshape(self._totals.size, -1)
         kernels = azimuth_correlations(field.grid_rad, np.zeros(1), field.nominal_m)
         waves, found = np.fft.rfft(gradients), {"mean": np.outer(self._totals, self._totals)}
-        for shape in ("oval", "seam"):
+        for shape in ROUND_SHAPES:
             kernel = kernels[shape][:, 0] - kernels[shape][:, 0].mean()
             spectrum = np.fft.rfft(kernel).real
             found[shape] = np.fft.irfft(waves * spectrum, gradients.shape[1]) @ gradients.T

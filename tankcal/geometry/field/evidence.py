@@ -15,8 +15,8 @@ from tankcal.geometry.field.components import (
     azimuth_correlations,
     log_covariance,
     mode_shares,
-    oval_columns,
     seam_correlations,
+    wave_columns,
     weld_columns,
 )
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, Likelihood, Part, prior_of
@@ -28,6 +28,7 @@ SMALLEST = 1e-8  # of a variance: what is left of a covariance that is followed 
 NEAR_M = 0.02  # along the arc, between azimuths that count as one for the common form
 WIDE_M = 1.0  # of a shared unknown that no prior binds, beside its first estimate
 MOST_FOLLOWED = 80  # values of the common form that are followed through all courses
+BULGES = np.array([one.shape == "mean" and one.orders != "joints" for one in COMPONENTS])
 MOST_ASKED = 200  # readings of a course, whose covariance is inverted at every step of a search
 
 
@@ -54,10 +55,11 @@ def likelihood_of(sites, radius_m, noise_m2, nominal_m, estimate_noise):
     shared, own = _shown(sites)
     own = own + missed + [len(COMPONENTS)] * estimate_noise
     variances = np.diag(noise_m2) if np.ndim(noise_m2) == 2 else noise_m2
-    prior = prior_of(
+    middle, *others = prior_of(
         COMPONENTS, log_covariance(sites.smoothed), variances if estimate_noise else None
     )
-    return Likelihood(parts, np.array(own), np.array(shared), spread, wide, *prior)
+    middle[: len(COMPONENTS)][BULGES] += 2 * np.log(sites.bulge_scale)  # logarithms of variances
+    return Likelihood(parts, np.array(own), np.array(shared), spread, wide, middle, *others)
 
 
 def _asked(sites):
@@ -91,16 +93,18 @@ def _common_values(sites, nominal_m):
 
     Values are those at the azimuths that the survey has, or, where these are many, the cosines and
     sines of the first modes: the rest of the seams is then taken as each course's own. Last come
-    the values of the heights, the peak of all welds, and what courses share without a prior.
+    the values of the heights, the modes of settlement, the peak of all welds, and what courses
+    share without a prior.
     """
     common = [(i, COMPONENTS[i]) for i in _shown(sites)[0]]
+    waves, heights = wave_columns(sites.azimuth_rad), sites.heights
     welds = np.zeros((len(sites), 1))
     for members, there in zip(sites.members, sites.welds_at(nominal_m), strict=True):
         welds[members, 0] = there.sum(axis=1)
     values = {
-        row: welds if one.shape == "weld" else one.height_columns(sites.zeta)
+        row: welds if one.shape == "weld" else one.columns(waves, heights)
         for row, (_, one) in enumerate(common)
-        if one.shape in ("mean", "weld")
+        if one.shape in ("mean", "settled", "weld")
     }
     there = np.isfinite(sites.azimuth_rad)
     place, azimuths = _gathered(sites.azimuth_rad[there], NEAR_M / nominal_m)
@@ -113,8 +117,8 @@ def _common_values(sites, nominal_m):
         along = azimuth_correlations(azimuths, azimuths, nominal_m)
     else:
         modes = np.arange(2.0, MOST_FOLLOWED // 2 + 2)
-        waves = multiples(sites.azimuth_rad, int(modes[-1]))
-        around = np.nan_to_num(np.hstack([one[:, 1:] for one in waves]))
+        first = multiples(sites.azimuth_rad, int(modes[-1]))
+        around = np.nan_to_num(np.hstack([one[:, 1:] for one in first]))
         along = {
             shape: np.diag(np.tile(share, 2))
             for shape, share in mode_shares(modes, nominal_m).items()
@@ -161,7 +165,7 @@ def _left_free(columns):
 def _part(sites, radius_m, noise_m2, nominal_m, members, common, estimate_noise):
     columns, spread, missed = common
     common_ones, own_ones = _shown(sites)
-    azimuth, zeta = sites.azimuth_rad[members], sites.zeta[members]
+    azimuth, heights = sites.azimuth_rad[members], sites.heights[members]
     left = _left_free(sites.free_columns(members))
 
     def seen(covariance):
@@ -171,14 +175,15 @@ def _part(sites, radius_m, noise_m2, nominal_m, members, common, estimate_noise)
         noise = seen(noise_m2[np.ix_(members, members)])
     else:
         noise = (left.T * noise_m2[members]) @ left
-    waves, seams = oval_columns(azimuth), seam_correlations(azimuth, azimuth, nominal_m)
+    waves, seams = wave_columns(azimuth), seam_correlations(azimuth, azimuth, nominal_m)
     welds = weld_columns(azimuth, sites.welds_of(sites.course[members[0]]), nominal_m)
     own, level = [], seen(seams)
     for one in (COMPONENTS[i] for i in own_ones):
         if one.shape == "seam":
-            own.append(level if one.is_level else seen(seams * one.height_covariance(zeta, zeta)))
+            is_level = one.is_level
+            own.append(level if is_level else seen(seams * one.height_covariance(heights, heights)))
         else:
-            there = left.T @ (welds if one.shape == "weld" else one.columns(waves, zeta))
+            there = left.T @ (welds if one.shape == "weld" else one.columns(waves, heights))
             own.append(there @ there.T)
     values, smallest = left.T @ columns[members], SMALLEST * np.eye(left.shape[1])
     for i in missed:

@@ -12,13 +12,17 @@ A course is seen by its own columns. Where those of two courses stand one above 
 alike; elsewhere as far as the columns, passed through a seam, vary alike with its place.
 """
 
+from math import factorial
+
 import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
 
 DEPTH_M, PART, WIDTH_M = 0.035, 0.0046, 0.8  # of a seam; depth as a part of the radius at most
 SAME_RAD = 1e-9  # azimuths that differ by rounding alone
-PLACES = 2**14  # round the shell, at which the columns of two courses are compared
+SHORTEST = 12.0  # part of WIDTH_M: shorter waves are 1e-7 of what passes through cos^2
+PER_WAVE = 4  # places of the grid for each of the shortest waves, at least: k d <= pi / 4
+TERMS = 14  # of the series of exp(-i k d): its error is below 1e-12
 
 
 def hidden_covariance_m2(course, azimuth_rad, radius_m):
@@ -52,8 +56,9 @@ def hidden_covariance_m2(course, azimuth_rad, radius_m):
     courses = range(int(course.max(initial=-1)) + 1)
     columns = [_columns(azimuth_rad[course == one]) for one in courses]
     size = np.array([_size_m(apart, radius_m) for _, apart in columns])
-    place = np.arange(1, PLACES // 2 + 1) * WIDTH_M / (FULL_TURN * radius_m)
-    passed = np.array([np.fft.rfft(_shares(*one))[1:] for one in columns]) * _seam(place)
+    wave = np.arange(1, int(SHORTEST * FULL_TURN * radius_m / WIDTH_M) + 2)
+    ratio = wave * WIDTH_M / (FULL_TURN * radius_m)
+    passed = np.array([_spectrum(*one, wave) for one in columns]) * _seam(ratio)
     passed /= np.maximum(np.linalg.norm(passed, axis=1, keepdims=True), 1e-30)
     return np.outer(size, size) * (passed @ passed.conj().T).real
 
@@ -93,8 +98,19 @@ def _seam(ratio):
     return np.sinc(ratio) / (1 - ratio**2)
 
 
-def _shares(around, apart):
-    """(PLACES,) the share of the turn that each column of points stands for, at its place."""
+def _spectrum(around, apart, wave):
+    """(k,) sum of share exp(-i wave azimuth) over columns; waves are 1, 2, ... (k,).
+
+    A column has the share of the turn for which it is the nearest. Its azimuth is a place of the
+    grid and a rest d. The rest enters by the series of exp(-i k d): without it the correlation of
+    two courses would change when the whole survey is turned.
+    """
+    count = 1 << int(np.ceil(np.log2(PER_WAVE * len(wave))))
     share = (apart + np.roll(apart, 1)) / (2 * FULL_TURN)
-    place = np.rint(around / FULL_TURN * PLACES).astype(int) % PLACES
-    return np.bincount(place, share, PLACES)
+    place = np.rint(around / FULL_TURN * count).astype(int)
+    rest = around - place * FULL_TURN / count
+    found = np.zeros(len(wave), dtype=complex)
+    for order in reversed(range(TERMS)):  # Horner: sum of (-i k)^m / m! times the m-th moments
+        moments = np.bincount(place % count, share * rest**order / factorial(order), count)
+        found = found * (-1j * wave) + np.fft.rfft(moments)[1 : len(wave) + 1]
+    return found

@@ -91,7 +91,8 @@ class MeanFunctionals:
         if one.shape != "mean":  # round the wall: it has no part in areas
             return np.zeros((self._totals.size, self._totals.size))
         about_mean = np.eye(LEVELS) - _shares()
-        height = about_mean @ one.height_covariance(gauss_heights(), gauss_heights()) @ about_mean.T
+        levels = self._field.sites.heights_at(0, gauss_heights())
+        height = about_mean @ one.height_covariance(levels, levels) @ about_mean.T
         count, flat = len(self._totals), self._totals.ravel()
         same = np.ones((count, count)) if one.common else np.eye(count)
         return without_rounding(size * np.outer(flat, flat) * np.kron(same, height))

@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 import scipy.sparse
 
-from tankcal.geometry.field.components import oval_columns
+from tankcal.geometry.field.components import wave_columns
 from tankcal.geometry.outlines import FULL_TURN
 
 WRAPS = np.arange(-2, 3)  # turns of a circumference that a short covariance is summed over
@@ -128,7 +128,7 @@ class OnCylinder:
     def _around(self, one, turn, other):
         """(n, m) c between turns (n,) and (m,)."""
         if one.shape == "oval":
-            return oval_columns(turn) @ oval_columns(other).T
+            return wave_columns(turn)["oval"] @ wave_columns(other)["oval"].T
         away = np.subtract.outer(turn, other)
         if one.shape == "first":
             return np.cos(away)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.geometry.field.components import weld_columns
+from tankcal.geometry.field.components import Heights, weld_columns
 from tankcal.geometry.outlines import FULL_TURN
 
 SAME_AZIMUTH_RAD = 1e-12
@@ -32,8 +32,14 @@ class Sites:
         Derivative of the radii by unknowns that courses share: the constant of a plumb line.
     points : tuple of ndarray, shape (p,), optional
         Course and azimuth of the points that the sites are means of.
+    spans : ndarray, shape (courses, 2), optional
+        Bottom and top of each course, as parts of the height of the shell; None: all courses are of
+        one height.
     smoothed : bool
         Whether the readings show the wall smoother than it is; see `components.log_covariance`.
+    bulge_scale : float
+        Sizes of bulges and tapers of this wall before the survey, over those of
+        `components.COMPONENTS`. Joints are not scaled: a weld shrinks by the plate, not by R.
     """
 
     course: np.ndarray
@@ -44,7 +50,9 @@ class Sites:
     welds_rad: tuple = ()
     shared: np.ndarray | None = None
     points: tuple | None = None
+    spans: np.ndarray | None = None
     smoothed: bool = False
+    bulge_scale: float = 1.0
 
     def __len__(self):
         return len(self.course)
@@ -61,8 +69,27 @@ class Sites:
             welds_rad=tuple(self.welds_of(one) for one in seen) if self.welds_rad else (),
             shared=None if self.shared is None else self.shared[chosen],
             points=None if self.points is None else _of_courses(*self.points, seen),
+            spans=self.course_spans[seen],
             smoothed=self.smoothed,
+            bulge_scale=self.bulge_scale,
         )
+
+    @property
+    def course_spans(self):
+        """(courses, 2) bottom and top of each course, as parts of the height of the shell."""
+        if self.spans is not None:
+            return self.spans
+        return spans_of(np.arange(self.course.max() + 2.0))
+
+    @property
+    def heights(self):
+        """`Heights` of the sites."""
+        return self.heights_at(self.course, self.zeta)
+
+    def heights_at(self, course, zeta):
+        """`Heights` at places of courses: a number or (n,) of each."""
+        low, high = self.course_spans[course].T
+        return Heights(zeta, low + (np.asarray(zeta) + 1) / 2 * (high - low))
 
     @property
     def seen(self):
@@ -99,6 +126,18 @@ class Sites:
             if np.any(self.leans[members] & (ring == one)):
                 columns.append(there * self.zeta[members, None])
         return np.hstack(columns)
+
+
+def spans_of(joints_m):
+    """(courses, 2) bottom and top of courses between joints, as parts of the height of the shell.
+
+    Examples
+    --------
+    >>> spans_of(np.array([0.0, 2.0, 4.0, 5.0])).tolist()
+    [[0.0, 0.4], [0.4, 0.8], [0.8, 1.0]]
+    """
+    parts = (joints_m - joints_m[0]) / (joints_m[-1] - joints_m[0])
+    return np.column_stack([parts[:-1], parts[1:]])
 
 
 def free_design(sites):

@@ -19,8 +19,8 @@ import scipy.linalg
 from tankcal.geometry.field.components import (
     COMPONENTS,
     azimuth_correlations,
-    oval_columns,
     seam_correlation,
+    wave_columns,
     weld_columns,
 )
 
@@ -150,7 +150,7 @@ class FieldValues:
         size = self._field.amplitudes.variances_m2[index]
         if one.shape == "weld":
             return size * self._peaks[index] @ self._covariances.peaks[index].T
-        found = self._along[one.shape] * one.height_covariance(spots.zeta, sites.zeta)
+        found = self._along[one.shape] * one.height_covariance(self._heights, sites.heights)
         if not one.common:
             found = found * (spots.course[:, None] == sites.course)
         return size * found
@@ -158,22 +158,27 @@ class FieldValues:
     def _around(self, first, second):
         """{shape: (k,) c between places (k,) and others}."""
         azimuth = self._spots.azimuth_rad
-        waves = oval_columns(azimuth)
-        return {
-            "mean": 1.0,
-            "oval": np.sum(waves[first] * waves[second], axis=1),
-            "seam": seam_correlation(azimuth[first] - azimuth[second], self._field.nominal_m),
+        found = {
+            shape: np.sum(waves[first] * waves[second], axis=1)
+            for shape, waves in wave_columns(azimuth).items()
         }
+        apart = azimuth[first] - azimuth[second]
+        return found | {"mean": 1.0, "seam": seam_correlation(apart, self._field.nominal_m)}
 
     def _between(self, index, first, second, around):
         """(k,) covariance between places (k,) and others by one component of unit variance."""
         one, spots = COMPONENTS[index], self._spots
         if one.shape == "weld":
             return np.sum(self._peaks[index][first] * self._peaks[index][second], axis=1)
-        found = around[one.shape] * one.height_between(spots.zeta[first], spots.zeta[second])
+        heights = self._heights
+        found = around[one.shape] * one.height_between(heights[first], heights[second])
         if not one.common:
             found = found * (spots.course[first] == spots.course[second])
         return found
+
+    @cached_property
+    def _heights(self):
+        return self._field.sites.heights_at(self._spots.course, self._spots.zeta)
 
     @cached_property
     def _along(self):

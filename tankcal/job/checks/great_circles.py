@@ -2,12 +2,11 @@
 
 from dataclasses import replace
 
-import numpy as np
-
-from tankcal.job.checking import UNIT_FACTOR, tell
+from tankcal.job.checking import tell
 from tankcal.job.checks.extent import has_great_circles, has_wall_points, is_metered
 from tankcal.job.checks.strapping import (
     MOST_STRAPS,
+    check_girths,
     check_readings,
     check_tape_temperature,
     refuse_inside,
@@ -116,24 +115,4 @@ def _check_settings(values, table, tapes, raw, log):
         tell(log.problem, raw, "sphere", "diameter_m", expected)
     check_tape_temperature(table, tapes, raw, log)
     refuse_inside(values, raw, log)
-    _check_sizes(values, table, log)
-
-
-def _check_sizes(values, table, log):
-    """Readings of one sphere, of the size of the drawing."""
-    readings, nominal = table.numbers("reading_m"), values["tank"]["nominal_diameter_m"]
-    if not np.any(np.isfinite(readings)):
-        return
-    usual, far = float(np.nanmedian(readings)), np.zeros(len(readings), dtype=bool)
-    if nominal is not None and not 1 / UNIT_FACTOR <= usual / (np.pi * nominal) <= UNIT_FACTOR:
-        usual, far = np.pi * nominal, np.arange(len(readings)) == 0
-    far |= np.abs(readings / np.nanmedian(readings) - 1) > MOST_APART
-    for row, reading in zip(np.array(table.rows)[far], readings[far], strict=True):
-        expected = message(
-            "circle_of_other_size",
-            "found {reading:g}; expected about {usual:.4g} m, as the other circles or the drawing"
-            " have it: is it in another unit, or no great circle?",
-            reading=reading,
-            usual=usual,
-        )
-        log.problem(table.file, expected, int(row), "reading_m")
+    check_girths(table, values["tank"]["nominal_diameter_m"], MOST_APART, log)

@@ -7,6 +7,7 @@ from tankcal.job.checks.extent import has_wall_points, is_metered, is_strapped
 from tankcal.job.checks.strapping import (
     END_M,
     MOST_STRAPS,
+    check_girths,
     check_readings,
     check_strapping_settings,
     refuse_others,
@@ -15,6 +16,7 @@ from tankcal.job.checks.strapping import (
     too_many_straps,
 )
 from tankcal.job.contract.rings import check_rings_alone
+from tankcal.job.plausibility import IMPOSSIBLE_MISS
 from tankcal.messages import message
 
 
@@ -41,6 +43,7 @@ def check_rings(values, tables, registers, raw, log):
     _check_places(rings, straps, log)
     check_readings(straps, tables, registers, raw, log)
     if values is not None:
+        check_girths(straps, values["tank"]["nominal_diameter_m"], IMPOSSIBLE_MISS, log)
         check_strapping_settings(values, tables, registers, True, raw, log)
 
 

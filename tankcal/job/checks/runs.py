@@ -1,6 +1,7 @@
 """Do the rows of liquid.csv follow one another? Starts, signs, dips, temperatures, units."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from tankcal.messages import message
 
 ABOVE_TOP_M, ABOVE_TOP = 0.05, 0.03  # sizes of a drawing are not the tank's
 BELOW_BOTTOM_M = 0.3
-CHECK = "check"
+CHECK, REST = "check", "rest"
 TELLING = 20.0  # a step whose level changes by so many sds of a dip may be told by sizes
 UNLIKE = (0.7, 1.4)  # volume of a batch over that by sizes
 GUESSES = (  # (least and most ratio, code of the unit)
@@ -115,24 +116,51 @@ def _check_start(table, run, places, log):
             run=run,
         )
         log.problem(table.file, expected, row, "run")
-    if table.of("use")[first] == CHECK:
+    if table.of("use")[first] in (CHECK, REST):
         expected = message(
-            "start_not_used", "found check; expected adjust: the run counts from its first dip"
+            "start_not_used",
+            "found {use}; expected adjust: the run counts from its first dip",
+            use=table.of("use")[first],
         )
         log.problem(table.file, expected, row, "use")
 
 
 def _check_batches(table, run, places, log):
-    volumes = table.of("volume_m3")
-    for place in places[1:]:
-        if volumes[place] == 0:
+    """Problems of batches of 0, and of dips at rest that have a batch or no times."""
+    volumes, uses, times = (table.of(name) for name in ("volume_m3", "use", "time"))
+    for before, place in pairwise(places):
+        if uses[place] == REST:
+            _check_rest(table, (run, place, volumes[place]), (times[before], times[place]), log)
+        elif volumes[place] == 0:
             expected = message(
                 "batch_of_nothing",
                 "found 0 within run {run!r}; expected what the meter showed since the row above; of"
-                " a dip that was read again give the mean, for a new run another name",
+                " a dip that was read again give the mean, or write use = rest and the times where"
+                " hours passed; for a new run another name",
                 run=run,
             )
             log.problem(table.file, expected, table.rows[place], "volume_m3")
+
+
+def _check_rest(table, step, times, log):
+    run, place, volume = step
+    if volume:
+        expected = message(
+            "batch_at_rest",
+            "found {volume:g} with use = rest in run {run!r}; expected 0: nothing passes the meter"
+            " while the liquid is at rest",
+            volume=volume,
+            run=run,
+        )
+        log.problem(table.file, expected, table.rows[place], "volume_m3")
+    if None in times:
+        expected = message(
+            "rest_without_time",
+            "a dip at rest in run {run!r} without its time or that of the row above; expected both:"
+            " they give the duration that a leak is divided by",
+            run=run,
+        )
+        log.problem(table.file, expected, table.rows[place], "time")
 
 
 def _check_dips(table, runs, log):
@@ -197,7 +225,10 @@ def _check_temperatures(table, runs, log):
     """Each of them in all rows that need it or in none, and those of the liquid together."""
     dips = table.of("dip_m")
     starts = {places[0] for places in runs.values()}
-    of_batches = [place for place in range(len(table.rows)) if place not in starts]
+    uses = table.of("use")
+    of_batches = [
+        place for place in range(len(table.rows)) if place not in starts and uses[place] != REST
+    ]
     of_dips = [place for place in range(len(table.rows)) if dips[place] is not None]
     absent = []
     for column in TEMPERATURES:

@@ -15,6 +15,7 @@ from tankcal.job.checks.obstructions import check_obstructions
 from tankcal.job.checks.spans import check_spans
 from tankcal.job.contract.observations import READINGS
 from tankcal.job.contract.registers import FREE
+from tankcal.job.plausibility import IMPOSSIBLE_MISS, unit_guess
 from tankcal.job.tables import nearest
 from tankcal.messages import message
 
@@ -50,6 +51,7 @@ def check_strapping(values, tables, registers, raw, log):
     if has_rows(tables["thickness"]):
         refuse_others(tables["thickness"], "course", known, log)
     if values is not None:
+        check_girths(straps, values["tank"]["nominal_diameter_m"], IMPOSSIBLE_MISS, log)
         check_strapping_settings(values, tables, registers, alone, raw, log)
         check_levels(straps, courses, values, log)
 
@@ -227,6 +229,40 @@ def _check_tapes(straps, instruments, tapes, raw, log):
             where = rows.get(owner), f"{owner}.{key}"
             if not log.has(file, *where):  # a master of two tapes is told once
                 log.problem(file, expected, *where)
+
+
+def check_girths(straps, nominal_m, most_apart, log):
+    """Readings whose size is that of the drawing, and of each other.
+
+    Parameters
+    ----------
+    straps : ColumnValues
+        With reading_m.
+    nominal_m : float or None
+        Diameter by the drawing.
+    most_apart : float
+        Share by which a reading may differ from the median of all.
+    log : Log
+    """
+    readings = straps.numbers("reading_m")
+    if not np.any(np.isfinite(readings)):
+        return
+    median = usual = float(np.nanmedian(readings))
+    far = np.abs(readings / median - 1) > most_apart
+    if nominal_m is not None:
+        ratio = median / (np.pi * nominal_m)
+        if not 1 / (1 + IMPOSSIBLE_MISS) <= ratio <= 1 + IMPOSSIBLE_MISS:
+            usual, far[0] = np.pi * nominal_m, True  # one line for all
+    for row, reading in zip(np.array(straps.rows)[far], readings[far], strict=True):
+        expected = message(
+            "circle_of_other_size",
+            "found {reading:g}; expected about {usual:.4g} m, as the other circumferences or"
+            " tank.nominal_diameter_m have it{guess}",
+            reading=reading,
+            usual=usual,
+            guess=unit_guess(float(reading) / usual),
+        )
+        log.problem(straps.file, expected, int(row), "reading_m")
 
 
 def _check_pulls(straps, log):

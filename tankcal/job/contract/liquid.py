@@ -91,8 +91,9 @@ LIQUID = (
     Field("time", "time", "when the dip was read, such as 2026-01-05T14:30"),
     choice(
         "use",
-        "check: this dip is only compared, its batch still went in; blank: adjust",
-        ("adjust", "check"),
+        "check: this dip is only compared, its batch still went in; rest: the dip was read again,"
+        " with all valves shut, and volume_m3 is 0; blank: adjust",
+        ("adjust", "check", "rest"),
     ),
     Field("note", "text", "for the reader"),
 )

@@ -3,7 +3,7 @@
 from tankcal.job.contract.kinds import LOADED, VERTICAL, WITH_POINTS
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.fields import Field
-from tankcal.job.plausibility import DIAMETERS, MOST_YIELD_MPA, SERVICES, SHELLS
+from tankcal.job.plausibility import DIAMETERS, MOST_YIELD_MPA, SERVICES, SHELLS, TARGETS
 
 MESH_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
 
@@ -86,6 +86,20 @@ CHECKS = (
         "what tank.nominal_diameter_m is by the drawing, to the millimetre: inside, middle (of the"
         " plates of the first course) or outside; blank: not known",
         DIAMETERS,
+        kinds=WITH_POINTS,
+    ),
+    positive(
+        "diameter_within_mm",
+        "by how much the diameter as built may differ from tank.nominal_diameter_m where that is a"
+        " rounded figure, millimetres; blank: 1 in 500 of it",
+        500,
+        kinds=WITH_POINTS,
+    ),
+    choice(
+        "targets",
+        "how targets are fixed to the wall: flat (film or thin magnets) or raised (prisms, balls or"
+        " targets in holders); blank: flat",
+        TARGETS,
         kinds=WITH_POINTS,
     ),
     positive(

@@ -126,6 +126,8 @@ class Job:
         Of the first course by tape, outside; only compared.
     diameter_is : {"inside", "middle", "outside"} or None
         What the nominal diameter is; only compared.
+    diameter_within_m : float or None
+        By how much the diameter as built may differ from a nominal one that is rounded.
     inspection : Inspection or None
         What an inspection is to know; None: nothing was said of one.
     strapping : Strapping or None
@@ -179,6 +181,7 @@ class Job:
     rule: Rule | None = None
     circumference_m: float | None = None
     diameter_is: str | None = None
+    diameter_within_m: float | None = None
     inspection: Inspection | None = None
     strapping: "Strapping | None" = None
     lines: "ReferenceLines | None" = None

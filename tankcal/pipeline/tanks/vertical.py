@@ -8,6 +8,7 @@ from tankcal.geometry.field.components import COMPONENTS, KINDS
 from tankcal.geometry.field.estimate import gauss_heights
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.job.contract.bottom import OF_CLOUD
+from tankcal.job.plausibility import INSIDE, PLATES_TO_INSIDE
 from tankcal.pipeline.tanks.common import (
     as_declared,
     deadwood_part,
@@ -105,7 +106,7 @@ def insets_of(job, switches):
 
 def nominal_inside_m(job, course):
     """Inside radius of a course by the drawing, m."""
-    less = {"middle": 0.5, "outside": 1.0}.get(job.diameter_is, 0.0)
+    less = PLATES_TO_INSIDE[job.diameter_is or INSIDE]
     return job.tank.nominal_diameter_m / 2 - less * course.thickness_m
 
 

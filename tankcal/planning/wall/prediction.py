@@ -15,6 +15,7 @@ from tankcal.pipeline.liquid import LiquidResult, Measured, measure_by_liquid
 from tankcal.pipeline.liquid_checks import check_liquid_result
 from tankcal.pipeline.nominal_wall import NominalWall
 from tankcal.pipeline.read_wall import ReadWall
+from tankcal.pipeline.section_homogeneity import OF_SCATTER
 from tankcal.pipeline.statements import statements
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.surveying import find_survey
@@ -34,7 +35,9 @@ OF_READINGS = (  # warnings that only true readings can give, or a drawing, whic
     *("size_told_by_distances", "size_told_by_one_course"),
     *("reading_copied", "line_copied", "no_control_readings"),
     *("repeats_apart", "strap_apart", "strapped_course_apart", "courses_exchanged"),
+    *("repeats_far", "strap_far", "strapped_course_far"),
     *("lines_of_inside", "many_offsets_set_aside", "setup_set_aside"),
+    *OF_SCATTER,
 )
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.errors import TankcalError
-from tankcal.geometry.field.components import COMPONENTS
+from tankcal.geometry.field.components import COMPONENTS, ROUND_SHAPES
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import compute_table
@@ -142,7 +142,7 @@ def _drawn_sizes(job, known, rng):
     shape_m = None if job.strapping is None else job.strapping.shape_sd_m
     if shape_m is not None:
         shapes = np.array([one.shape for one in COMPONENTS])
-        drawn = np.sum(sizes[np.isin(shapes, ("oval", "seam"))])
+        drawn = np.sum(sizes[np.isin(shapes, ROUND_SHAPES)])
         sizes[shapes != "mean"] *= shape_m**2 / drawn
     return sizes
 

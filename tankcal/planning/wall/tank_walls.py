@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from tankcal.geometry.drawn_outlines import draw_departures
+from tankcal.geometry.field.sites import spans_of
 from tankcal.geometry.girth import girth_of, tangent_excess
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.wall_straps import area_term
@@ -38,7 +39,7 @@ class RoundWall:
 
     @cached_property
     def _excess_m(self):
-        return tangent_excess(self._amplitudes, self.nominal_m)[0]
+        return float(tangent_excess(self._amplitudes, self.nominal_m, [0.5])[0, 0])
 
     def girth_m(self, course, level_m):
         """Perimeter of the painted shell that a tape lies on."""
@@ -79,7 +80,8 @@ class DrawnWall:
         self._summed = [self._row[one] for one in nodes]
         welds = [one.welds_rad or () for one in job.courses]
         zeta = 2 * np.array(parts) - 1
-        self._departures = draw_departures(rng, sizes, zeta, welds, self.nominal_m)
+        spans = spans_of(np.append(self._feet, self._heights.sum()))
+        self._departures = draw_departures(rng, sizes, zeta, welds, self.nominal_m, spans)
         count = self._departures.shape[2]
         self._azimuth = np.arange(count) * FULL_TURN / count
 

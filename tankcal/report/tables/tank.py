@@ -71,6 +71,31 @@ SECTIONS = Table(
     csv_style="%.6f",
 )  # fmt: skip
 
+HOMOGENEITY = Table(
+    "homogeneity",
+    (
+        Column("statistic", decimals=2, sheet="bartlett_statistic"),
+        Column("dof", decimals=0, sheet="degrees_of_freedom"),
+        Column("p", decimals=5, heading="p_value", sheet="p_value"),
+    ),
+    rows=lambda record: [record["homogeneity"]],
+)
+
+SECTION_NOISE = Table(
+    "section_noise",
+    (
+        Column("section", sheet="section", width=9),
+        Column("noise_factor", decimals=2, sheet="noise_factor"),
+        Column("noise_dof", decimals=1, sheet="noise_dof"),
+        Column("noise_share", decimals=2, sheet="noise_share"),
+        Column("compared", words="yes_no", heading="noise_compared", sheet="noise_compared"),
+        Column("chi2", decimals=1, heading="circle_chi2", sheet="circle_chi2"),
+        Column("chi2_dof", decimals=0, heading="dof", sheet="degrees_of_freedom"),
+        Column("p", decimals=5, heading="p_stated", sheet="p_stated"),
+    ),
+    rows=lambda record: record["homogeneity"]["sections"],
+)
+
 
 def modes_table(record):
     """Amplitudes of the form of each section: mode 2 is the ellipse, mode 3 has three lobes."""

@@ -26,6 +26,11 @@ def courses_sheet(book, record):
     if record["sections"]:
         tables += [
             (book.word("headings.sections"), "sections", columns_of(book, tank.SECTIONS)),
+            *(
+                (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
+                for table in (tank.HOMOGENEITY, tank.SECTION_NOISE)
+                if record.get("homogeneity")
+            ),
             (book.word("headings.modes"), "modes", columns_of(book, tank.modes_table(record))),
             (book.word("headings.shell"), "shell", columns_of(book, tank.SHELL)),
         ]

@@ -58,6 +58,9 @@ class Verdict:
         The smallest size that the test would show, with power 0.8 at 0.1 %.
     is_named : bool
         The likeliest, where |w| is large enough, and those that cannot be told from it.
+    undetected_U : float or None
+        External reliability: largest change of a volume of the table by an error of the size
+        `detectable`, over the U of that volume; None: not computed for causes of this kind.
     """
 
     cause: Alternative
@@ -66,6 +69,7 @@ class Verdict:
     w: float
     detectable: float
     is_named: bool = False
+    undetected_U: float | None = None
 
 
 def name_causes(found, alternatives):

@@ -71,13 +71,17 @@ def reading_effects(metering, fill, reduced, volume_m3, area_m2, growth=None):
 
 
 def batch_sd_m3(metering, fill):
-    """(n,) standard deviation of what was metered in each step, at the table's temperature."""
+    """(n,) standard deviation of what was metered in each step, at the table's temperature.
+
+    A step at rest has none: the meter was not started.
+    """
     meters = [metering.meters[name] for name in metering.meter]
     relative = np.array([one.repeatability for one in meters])
     fixed = np.array([one.fixed_m3 for one in meters])
     by_meter = np.hypot(relative * metering.volume_m3, fixed)
     own = np.where(np.isfinite(metering.s_volume_m3), metering.s_volume_m3, by_meter)
-    return np.sqrt(np.sum(np.where(fill.batches, own, 0.0) ** 2, axis=1))
+    counted = fill.batches & (metering.volume_m3 != 0)
+    return np.sqrt(np.sum(np.where(counted, own, 0.0) ** 2, axis=1))
 
 
 def _by_factors(metering, fill, reduced):

@@ -5,6 +5,7 @@ from tankcal.job.checks.plausible.liquid import check_metering
 from tankcal.job.checks.plausible.material import check_material
 from tankcal.job.checks.plausible.plates import check_plates
 from tankcal.job.checks.plausible.sizes import check_rings, check_sizes
+from tankcal.job.checks.plausible.targets import check_targets
 
 __all__ = ["check_metering", "check_plausible"]
 
@@ -16,5 +17,6 @@ def check_plausible(values, tables, extent, kind, raw, log):
     check_sizes(values, kind, raw, log)
     check_plates(values, tables, kind, raw, log)
     check_levels(values, tables, extent, kind, raw, log)
+    check_targets(values, tables, log)
     if kind == "vertical":
         check_rings(values, tables["points"], tables["courses"], log)
