@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from draws import draws
+from numpy.polynomial.legendre import legvander
 from real_tank import write_real_job
 
 import tankcal
@@ -121,3 +122,63 @@ def test_a_station_less_is_within_u(survey, whole, figure):
         ppm = 1e6 * np.array([off[TOTAL], expanded[TOTAL]]) / whole[0][TOTAL]
         figure(f"without station {station + 1}: ppm off, U", f"{ppm[0]:.0f} {ppm[1]:.0f}")
         assert np.all(np.abs(off) < expanded)
+
+
+def test_the_bulge_is_the_same_in_all_courses(survey, zeta, figure):
+    """The excess at mid course does not fall upwards, as a rest of the widening by filling does."""
+    for height, places in (
+        ("quarters", (-0.5, 0.5)),
+        ("fifths", (-0.6, 0.6)),
+        ("5 %", (-0.9, 0.9)),
+    ):
+        excess, covariance = _excess_at(places, survey, zeta)
+        figure(f"excess at the {height}, mean and its sd, mm",
+               f"{excess.mean():+.2f} {np.sqrt(covariance.mean()):.2f}")  # fmt: skip
+    excess, covariance = _excess_at((0.0,), survey, zeta)
+    courses = np.arange(len(excess)) - (len(excess) - 1) / 2
+    mean = excess.mean(), np.sqrt(covariance.mean())
+    weights = np.linalg.inv(covariance)
+    by = np.column_stack([np.ones(len(excess)), courses])
+    cofactor = np.linalg.inv(by.T @ weights @ by)
+    slope = (cofactor @ by.T @ weights @ excess)[1], np.sqrt(cofactor[1, 1])
+    figure("excess at mid course, mean and its sd, mm", "{:+.2f} {:.2f}".format(*mean))
+    figure("its slope, mm a course, and its sd", "{:+.3f} {:.3f}".format(*slope))
+    about = excess - np.sum(weights @ excess) / np.sum(weights)
+    figure("chi-squared of the courses about their mean", f"{about @ weights @ about:.1f}")
+    assert mean[0] > 5 * mean[1]
+    assert slope[0] + 2 * mean[0] / len(excess) > 3 * slope[1]  # by filling it is 0 at the top
+
+
+def _excess_at(places, survey, zeta, waves=24):
+    """(courses,) mean radius at heights of a course less that of the course, mm; its covariance.
+
+    Robust least squares of radii: Legendre orders 0 to 4 of each course, waves up the whole shell.
+    """
+    kept = np.isfinite(zeta)
+    x, y, z = survey.job.points.xyz_m[kept].T
+    z = z - survey.job.datum.bottom_z_m
+    joints = joints_of(survey.job)
+    course = np.clip(np.searchsorted(joints, z) - 1, 0, len(joints) - 2)
+    circle = np.column_stack([2 * x, 2 * y, np.ones(len(x))])
+    axis = np.append(np.linalg.lstsq(circle, x**2 + y**2)[0][:2], [0.0, 0.0])
+    own = np.eye(len(joints) - 1)[course][:, :, None] * legvander(zeta[kept], 4)[:, None]
+    own = own.reshape(len(x), -1)
+    for _ in range(4):  # the axis, and the azimuths about it
+        away = np.column_stack([x - axis[0] - axis[2] * z, y - axis[1] - axis[3] * z])
+        azimuth, radius = np.arctan2(*away.T), np.hypot(*away.T)
+        turns = np.exp(1j * np.outer(azimuth, np.arange(1, waves + 1)))
+        wave = np.stack([turns.imag, turns.real], axis=2).reshape(len(x), -1)
+        design = np.hstack([wave[:, :2], z[:, None] * wave[:, :2], wave[:, 2:], own])
+        weight = np.ones(len(x))
+        for _ in range(10):  # Huber's weights
+            found = np.linalg.lstsq(design * weight[:, None], radius * weight)[0]
+            miss = np.abs(radius - design @ found)
+            weight = np.sqrt(1 / np.maximum(1, miss / (1.5 * 1.4826 * np.median(miss))))
+        axis = axis + found[:4]
+    normal = (design * weight[:, None]).T @ (design * weight[:, None])
+    noise = np.sum((weight * miss) ** 2) / (len(x) - len(normal))
+    there = legvander(np.array(places), 4).mean(axis=0) - np.eye(5)[0]  # less order 0, the mean
+    of_courses = np.kron(np.eye(len(joints) - 1), there)
+    first = len(normal) - own.shape[1]
+    covariance = noise * np.linalg.inv(normal)[first:, first:]
+    return 1e3 * of_courses @ found[first:], 1e6 * of_courses @ covariance @ of_courses.T

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from draws import draws
 from generated_strapping import shape_of, strapped_job
-from generated_walls import make_wall
+from generated_walls import GeneratedWall, make_wall
 from test_coverage_of_walls import ROWS, judged, least_in_class, study
 
 from tankcal.job.model import DeclaredInput
@@ -83,3 +83,24 @@ def test_without_the_area_term_intervals_hold_less_study(tmp_path, figure):
     figure("totals off, mean ppm, with and without it", f"{away[1.0]:.0f} {away[0.0]:.0f}")
     assert held[1.0] > held[0.0] + 0.1
     assert abs(away[1.0]) < 0.7 * away[0.0]
+
+
+@pytest.mark.study
+def test_the_area_term_is_too_large_for_a_form_of_few_waves_study(tmp_path, figure):
+    """The declared size counts as a typical form; settlement has fewer waves, and less area."""
+    off = {}
+    for waves in (0, 2, 12):
+        wall = GeneratedWall(8.0, 6, 2.0)
+        if waves:
+            wall.add_to_all(lambda a, n=waves: 0.01 * np.cos(n * a), np.ones_like)
+        errors = []
+        for seed in range(draws(2, 20)):  # the same errors of the crew for each form
+            rng = np.random.default_rng(seed)
+            job = strapped_job(rng, wall, straps=2, folder=tmp_path / "job", laying_m=3e-4)
+            body = body_of(job, find_strapped_wall(job, lambda text: None))
+            errors.append(judged(wall, body, "coil", 2).error[TOTAL])
+        off[waves] = 1e6 * np.mean(errors)
+    few, many = off[2] - off[0], off[12] - off[0]
+    figure("totals off, ppm, by 10 mm of 2 and of 12 waves", f"{few:+.0f} {many:+.0f}")
+    assert few < -80
+    assert abs(many) < 50
