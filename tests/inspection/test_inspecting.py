@@ -179,7 +179,7 @@ def test_a_line_for_each_check(capsys, kept):
     speak("en")
     out = capsys.readouterr().out.replace("\N{NO-BREAK SPACE}", " ").splitlines()
     assert len(out) == 2 + 7  # the rule, that it was not read, the checks
-    assert "Verticalidad, eje: +29,1 mm, U 14,4 mm, límite ≤ 95 mm" in out[2]
+    assert "Verticalidad, eje: +29,1 mm, U 14,3 mm, límite ≤ 95 mm" in out[2]
 
 
 def test_it_speaks_the_language_of_its_job_or_record(tmp_path, capsys):

@@ -55,7 +55,7 @@ def test_published_sections_are_not_homogeneous(example_result):
     assert first.p == pytest.approx(2 * chi2.cdf(first.chi2, 21), rel=1e-9)
     assert [one.section for one in found.sections if one.differs] == ["1"]
     warnings = warn_of_sections(example_result.job, example_result.wall)
-    assert "0.21 in section 1 and 1.75 in section 5" in str(warnings[0])
+    assert "0.20 in section 1 and 1.91 in section 5" in str(warnings[0])
 
 
 def test_the_record_keeps_the_tests(example_result):
