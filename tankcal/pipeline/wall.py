@@ -147,6 +147,10 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
             estimate_noise=estimated,
             start_m2=_sizes_of(shell),
         )
+    if has_loose_poses(job) and not is_known:
+        # set-ups take up the waves that are as many round the tank as they are, so the readings
+        # show less of the common form than there is: its prior median stays the least of it
+        amplitudes = amplitudes.with_least("common ovality")
     if amplitudes.noise != 1.0:  # it may be half a gigabyte
         covariance = covariance * amplitudes.noise
         noise *= amplitudes.noise
@@ -204,7 +208,12 @@ def is_smoothed(job):
     """Whether the readings show the wall smoother than it is: limbs pass over its valleys, set-ups
     that nothing but the wall ties are fitted to what they see of it.
     """
-    return job.tangents is not None or any(one.what == "pose" for one in job.points.unbound)
+    return job.tangents is not None or has_loose_poses(job)
+
+
+def has_loose_poses(job):
+    """Whether some set-ups of hits are tied to the wall alone."""
+    return any(one.what == "pose" for one in job.points.unbound)
 
 
 def _sizes_of(shell):

@@ -32,10 +32,11 @@ LEVEL_GAP_M = 0.15  # between heights that are fitted with radii of their own
 NARROW_RAD = 0.1  # directions of a set-up that sees a line of the wall, and looks along its normal
 START_SDS = (0.3, 0.3, 0.1)  # away from the axis, across, m, and turn, rad: of a pose at first
 START_OF_LINE = (0.3, 1e-3, 1e-3)  # of one that sees a line
+EVEN_RAD = 0.3  # sd of an azimuth round the tank that is only assumed to be even, and of its turn
 AXIS_SDS = (0.3, 0.3, 0.02, 0.02)  # m, and m/m of its lean
 SETTLEMENT_SD_M = 0.02  # of the waves of each mode of settlement at the top
 WALL_SD_M, FAR_SDS = 0.005, 3.0  # of a hit from that surface; further ones weigh less
-ROUNDS, CENTRE_ROUNDS = 15, 20
+ROUNDS, CENTRE_ROUNDS = 60, 20
 MIRRORED, EXCHANGED = 1.15, 1.3  # times the rms of that order (sound ones: 1.02, 1.13): refused
 MOST_EXCHANGED = 12  # set-ups that are tried with any two exchanged
 
@@ -81,7 +82,8 @@ def place_untied(hits, poses, untied, *, nominal_m, is_inside):
         for one, at, centre in zip(untied, azimuth, centres, strict=True):
             xyz[one, :2] = axis + np.hypot(*centre) * np.array([np.sin(at), np.cos(at)])
             zero[one] = at + np.pi - np.arctan2(*centre)
-        return _fitted(replace(poses, xyz_m=xyz, orientation_rad=zero), own, pose, untied, axis)
+        start = replace(poses, xyz_m=xyz, orientation_rad=zero)
+        return _fitted(start, own, pose, untied, axis, is_even=np.isnan(given))
 
     even = FULL_TURN * np.arange(len(untied)) / len(untied)
     found, misfit = placed(np.where(np.isnan(given), even, given))
@@ -186,9 +188,11 @@ def _centre(own, nominal_m, is_inside):
     return centre
 
 
-def _fitted(poses, own, pose, untied, axis):
+def _fitted(poses, own, pose, untied, axis, *, is_even):
     """The poses after least squares on the leaning surface of the heading, and the rms of the hits
     about it, none more than FAR_SDS of a wall's, m.
+
+    is_even  (untied,) whether the azimuth of a set-up round the tank was only assumed
     """
     z = poses.xyz_m[pose, 2] + own[:, 2]
     middle = z.mean()
@@ -201,7 +205,7 @@ def _fitted(poses, own, pose, untied, axis):
     prior = np.diag(np.concatenate([np.ones(free), AXIS_SDS, settled]) ** -2.0)
     for one, i in place.items():
         prior[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = _start(
-            poses.xyz_m[one, :2] - axis, own[pose == one]
+            poses.xyz_m[one, :2] - axis, own[pose == one], is_even=is_even[i]
         )
     shift, lean, waves = np.zeros(2), np.zeros(2), np.zeros(2 * len(SETTLEMENT_MODES))
     xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
@@ -247,14 +251,17 @@ def _fitted(poses, own, pose, untied, axis):
     return replace(poses, xyz_m=xyz, orientation_rad=zero), float(misfit)
 
 
-def _start(away, own):
+def _start(away, own, *, is_even):
     """(3, 3) weight of x, y and turn of a pose, which stands there from the axis, as it is known
     at first: a set-up whose sights are a line of the wall looks along its normal.
     """
     middle = np.arctan2(*own[:, :2].mean(axis=0))
     turn = np.arctan2(own[:, 0], own[:, 1]) - middle
     wide = np.ptp(turn - FULL_TURN * np.round(turn / FULL_TURN))
+    distance = np.hypot(*away)
     sds = START_SDS if wide > NARROW_RAD else START_OF_LINE
-    x, y = away / np.hypot(*away)
+    if is_even and wide > NARROW_RAD:
+        sds = (START_SDS[0], EVEN_RAD * distance, EVEN_RAD)
+    x, y = away / distance
     axes = np.array([[x, -y, 0], [y, x, 0], [0, 0, 1]])
     return axes @ np.diag(np.array(sds) ** -2.0) @ axes.T

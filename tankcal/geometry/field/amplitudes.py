@@ -63,6 +63,13 @@ class Amplitudes:
         """
         return self.likely_m2 * np.exp(np.diag(self.log_covariance) / 2)
 
+    def with_least(self, name):
+        """The same with a component of at least its median before the survey."""
+        index = [one.name for one in COMPONENTS].index(name)
+        likely_m2 = self.likely_m2.copy()
+        likely_m2[index] = max(likely_m2[index], COMPONENTS[index].median_m ** 2)
+        return replace(self, likely_m2=likely_m2)
+
 
 def assumed_amplitudes(ovality_m=None, common_ovality_m=None, *, smoothed=False):
     """`Amplitudes` of a wall that nobody measured yet: the medians, as wide as they are before.
