@@ -408,6 +408,14 @@ TABLE = (
         verified=False,
     ),
     Plausible(
+        "control.csv: x_m, y_m of stations of untied set-ups of hits",
+        "given to 0.3 m where no course is strapped",
+        "stations that were left blank and assumed to be evenly spaced",
+        "",
+        ("places_assumed",),
+        verified=False,
+    ),
+    Plausible(
         "clouds.toml: s_translation_mm, s_rotation_arcsec",
         "pairs of scans no further apart than these and the scanners allow (0.1 %), all overlaps"
         " together as well (1 %)",

@@ -5,7 +5,7 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.geometry.shell import course_of
-from tankcal.messages import message
+from tankcal.messages import list_some, message
 from tankcal.pipeline.cause_correlations import noise_of_wall
 from tankcal.pipeline.level_checks import (
     check_nominal,
@@ -23,7 +23,7 @@ from tankcal.pipeline.moved_setups import (
 from tankcal.pipeline.survey_limits import limit_at, limits_of, repeat_factor
 from tankcal.pipeline.wall import joints_of
 from tankcal.survey.control_drift import repeats_of
-from tankcal.survey.sighting import NETWORK
+from tankcal.survey.sighting import NETWORK, WALL
 
 RULES, CONTROL = "wall_hits", "control_readings.csv"
 UNLIKE_SDS = 3.0  # of an offset or a scale from its certificate
@@ -45,6 +45,7 @@ def check_hits(job, wall, sighting):
     """`Problem`s of the hits of a wall."""
     return (
         *_of_control(job),
+        *_of_assumed_places(job, wall, sighting.poses),
         *_of_levels(job, wall),
         *_of_courses(job, sighting),
         *_of_incidence(sighting),
@@ -90,6 +91,28 @@ def _of_control(job):
                     unit=unit,
                 )
                 yield Problem(CONTROL, text, one.rows[worst], name)
+
+
+def _of_assumed_places(job, wall, poses):
+    """Set-ups that were placed evenly round the tank, and whose places determine its radius.
+
+    A radius by the curvature of arcs depends on where these lie; a strap makes it independent.
+    """
+    stations, setups = job.hits.stations, job.hits.setups
+    unknown = np.full(3, np.nan)
+    names = [
+        name
+        for (name, _), tie in zip(poses.keys, poses.ties, strict=True)
+        if tie == WALL and np.isnan(stations.get(setups[name].station, unknown)[:2]).any()
+    ]
+    if names and wall.told is not None and job.strapping is None:
+        text = message(
+            "places_assumed",
+            "the stations of set-ups {setups} are blank and were assumed to be evenly spaced; the"
+            " radius depends on them: give x_m and y_m to 0.3 m in control.csv, or strap a course",
+            setups=list_some(dict.fromkeys(names), SHOWN),
+        )
+        yield Problem("control.csv", text, column="x_m")
 
 
 def _sds_of(hits, setup):

@@ -44,11 +44,6 @@ from tankcal.pipeline.wall_straps import (
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
 
 STATED_BY_STRAPS, STATED_BY_LINES = (), ("mean",)
-MIDDLE = (0.35, 0.65)  # of a course's height: straps there alone are longer than its mean girth
-BARREL_M = (
-    1.5e-3  # taken off there: half of the median before the survey, as some courses have none
-)
-BULGE_LEFT = 0.75  # sizes of the bulges in U after that, over those of `components.COMPONENTS`
 
 
 @dataclass(frozen=True)
@@ -86,7 +81,6 @@ class TapedWall(ReadWall):
     plate_sd_m: dict
     tapes: tuple
     shape_sd_m: float
-    rise_m = 0.0  # of the straps of the first course above its mean radius, by an assumed barrel
 
     @cached_property
     def radius_m(self):
@@ -109,7 +103,6 @@ class TapedWall(ReadWall):
             radius_m=self.radius_m,
             plate_sd_m=self.plate_sd_m,
             tapes=self.tapes,
-            rise_m=self.rise_m,
         )
 
     def factors(self, job, weights):
@@ -128,24 +121,11 @@ class TapedWall(ReadWall):
 
 @dataclass(frozen=True)
 class StrappedWall(TapedWall):
-    """The wall of an upright tank as strapped, with what a `TapedWall` has.
+    """The wall of an upright tank as strapped."""
 
-    Attributes
-    ----------
-    barrel_m : float
-        Bulge of each course, middle against joints, that was taken off its straps.
-    """
-
-    barrel_m: float = 0.0
     surveyed_as = "strapped"
     shell = UprightAxis()
     without_inputs = ("offset",)  # of points; a tape has one of its own
-
-    @property
-    def rise_m(self):
-        """How far the straps of the first course lie above its mean radius by the barrel, m."""
-        sites = self.field.sites
-        return self.barrel_m * float(np.mean(_rise(sites.zeta[sites.course == 0])))
 
     def lowest_outline(self, azimuth_rad):
         """(x, y) of the axis, and (n,) radii of the first course, m."""
@@ -171,9 +151,6 @@ def find_strapped_wall(job, progress, amplitudes=None):
     term = AreaTerm(*perimeter_excess(straps.shape_sd_m, nominal))
     joints, zero = joints_of(job), shell_zero(job, None)
     readings = readings_of_straps([reduced[i] for i in places], courses, term)
-    barrel = _barrel_of(job, sites_of(readings, joints, zero).zeta)
-    if barrel:
-        readings = _less_barrel(readings, sites_of(readings, joints, zero).zeta)
     if lines is not None:
         progress(
             message(
@@ -191,11 +168,7 @@ def find_strapped_wall(job, progress, amplitudes=None):
     former = readings_of_untold(job, told_courses(job, set()), joints, zero)
     readings, places = readings + former, places + [-1] * len(former)
     readings, tested, field = adjust_readings(
-        readings,
-        (joints, zero, nominal),
-        amplitudes,
-        snooping=job.snooping,
-        bulge_scale=BULGE_LEFT if barrel else 1.0,
+        readings, (joints, zero, nominal), amplitudes, snooping=job.snooping
     )
     return StrappedWall(
         joints_m=joints,
@@ -209,32 +182,7 @@ def find_strapped_wall(job, progress, amplitudes=None):
         plate_sd_m=gauged_plates(job),
         tapes=tapes_used(straps),
         shape_sd_m=straps.shape_sd_m,
-        barrel_m=barrel,
     )
-
-
-def _barrel_of(job, zeta):
-    """Barrel that is taken off straps at heights (n,) of their courses, m; 0: none.
-
-    Reference lines show the profile of a course, and a declared barrel takes its place.
-    """
-    is_known = job.lines is not None or any(one.name == "barrel" for one in job.inputs)
-    share = (zeta + 1) / 2
-    at_middle = np.all((share >= MIDDLE[0]) & (share <= MIDDLE[1]))
-    return BARREL_M if at_middle and not is_known else 0.0
-
-
-def _less_barrel(readings, zeta):
-    """Readings less what a barrel adds to the mean radius of a course at heights (n,)."""
-    off = BARREL_M * _rise(zeta)
-    return [
-        replace(one, radius_m=one.radius_m - rise) for one, rise in zip(readings, off, strict=True)
-    ]
-
-
-def _rise(zeta):
-    """(n,) a barrel of one, level at its joints, less its mean over the course, 8 / 15."""
-    return (1 - zeta**2) ** 2 - 8 / 15
 
 
 def adjust_readings(readings, sizes, amplitudes, *, snooping, bulge_scale=1.0):

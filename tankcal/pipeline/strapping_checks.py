@@ -303,7 +303,7 @@ def _of_first_course(job, straps):
     course = job.courses[0]
     plate = course.thickness_m + course.paint_m
     yield from check_side(job, 2 * (straps.radius_m[0] - plate), plate, 0.0)
-    found = straps.circumference_m[0] + straps.rise_m * straps.per_radius  # where it was strapped
+    found = straps.circumference_m[0]
     declared = job.circumference_m
     if declared is not None and abs(found - declared) > limit_of_repeats(found):
         yield Problem(

@@ -105,8 +105,6 @@ class Straps:
         {course index: standard uncertainty of its plate by a gauge}.
     tapes : tuple of (Tape, float)
         Those that were read, and the standard uncertainty of their scale by a master.
-    rise_m : float
-        How far the straps of the first course lie above its mean radius by an assumed barrel.
     """
 
     reduced: tuple[Reduced, ...]
@@ -120,7 +118,6 @@ class Straps:
     radius_m: np.ndarray
     plate_sd_m: dict
     tapes: tuple
-    rise_m: float = 0.0
 
     @property
     def per_radius(self):

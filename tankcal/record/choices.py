@@ -26,7 +26,7 @@ def choices_of(result):
     values = {
         "zero": zero_of(result),
         **(_shell_choices(job, result) if result.wall is not None else {}),
-        **(_strapped_choices(job, result.strapped) if result.strapped is not None else {}),
+        **(_strapped_choices(job) if result.strapped is not None else {}),
         **_liquid_choices(result),
         **_radii_choices(result),
         **_ring_choices(result),
@@ -115,7 +115,7 @@ def _measured_by(job, result):
     return found
 
 
-def _strapped_choices(job, strapped):
+def _strapped_choices(job):
     """What was assumed about a shell that a tape was put round."""
     roof = job.roof and job.roof.weighing
     return {
@@ -128,7 +128,6 @@ def _strapped_choices(job, strapped):
         "course_heights": "along_axis",
         "roof": _fitting_choice(job.switches.roof, roof, roof),
         "form": "learned",
-        **({"barrel": 1000 * strapped.barrel_m} if strapped.barrel_m else {}),
     }
 
 

@@ -13,7 +13,6 @@ from tankcal.errors import InputError, SolutionError
 from tankcal.pipeline.compared_courses import exchanged_courses
 from tankcal.pipeline.strapped_wall import field_of_readings, find_strapped_wall
 from tankcal.pipeline.strapping_checks import limit_of_repeats
-from tankcal.record import record_of
 from tankcal.survey.strapping import Obstruction
 
 OPEN = {0.9: 146.70404, 1.8: 293.40807, 3.6: 586.81461, 6.0: 978.05449, 8.4: 1369.27879}
@@ -36,35 +35,6 @@ def test_tank_s_1(tmp_path, density):
     found = {height: result.at(height).value_m3 for height in OPEN}
     assert found == pytest.approx(expected, abs=1.6e-5)  # of two rounded figures
     assert codes(result) == set()
-
-
-@pytest.mark.parametrize(
-    ("shares", "declared", "barrel_mm"),
-    [
-        ((0.2, 0.8), (), 0),
-        ((0.5, 0.5), (), 1.5),
-        ((0.2, 0.5), (), 0),
-        ((0.5, 0.5), ("barrel",), 0),
-    ],
-)
-def test_a_barrel_is_taken_off_straps_at_middles_alone(tmp_path, shares, declared, barrel_mm):
-    """Truth: 7 / 15 of a barrel that is level at its joints, at the middle; none elsewhere."""
-    parts = strapped_parts()
-    parts.tables["uncertainty"] = [["input", "u", "unit"], *([one, 0.5, "mm"] for one in declared)]
-    bottoms = np.concatenate([[0.0], np.cumsum([row[0] for row in S_1])])
-    for row in parts.tables["circumferences"][1:]:
-        course = int(row[1]) - 1
-        low, high = bottoms[course : course + 2]
-        row[2] = round(float(low + shares["ab".index(row[0][-1])] * (high - low)), 6)
-    result = result_of(parts, tmp_path)
-    record = record_of(result)
-    choices = {one["code"]: one["value"] for one in record["choices"]}
-    assert choices.get("barrel", 0) == barrel_mm
-    assert result.straps.rise_m == pytest.approx(7 / 15 * barrel_mm / 1000)
-    scale = (1 - 7 / 15 * barrel_mm / 1000 / 7.2042) ** 2  # of the area of each course
-    assert result.at(8.4).value_m3 == pytest.approx(
-        OPEN[8.4] * scale, abs=0.02
-    )  # readings weigh unlike
 
 
 def test_folder_and_workbook_give_the_same(tmp_path):
