@@ -13,7 +13,7 @@ from independent_shells import make_shell
 from numpy.polynomial.legendre import leggauss
 from test_coverage_of_walls import ROWS, judged
 
-from tankcal.geometry.field.components import COMPONENTS
+from tankcal.geometry.field.components import COMPONENTS, Heights
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall import find_wall
 
@@ -93,7 +93,7 @@ def _prior_mean_mm():
     """Mean of the common bulge at mid course before a survey, if it were always outwards, in mm."""
     bulge = next(one for one in COMPONENTS if one.name == "common bulge")
     amplitude = bulge.median_m * np.exp(bulge.log_sd**2 / 8)  # of a log-normal variance
-    return 1e3 * amplitude * bulge.height_columns(np.zeros(1))[0, 0]
+    return 1e3 * amplitude * bulge.height_columns(Heights(np.zeros(1), np.full(1, 0.5)))[0, 0]
 
 
 def test_a_bulge_of_one_millimetre_has_its_closed_form():

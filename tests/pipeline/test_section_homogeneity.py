@@ -19,7 +19,7 @@ from tankcal.pipeline.section_homogeneity import homogeneity_of, warn_of_section
 from tankcal.pipeline.wall import find_wall
 from tankcal.record import record_of
 
-SHARE_ACCUSED = 0.01  # of valid surveys, at most
+SHARE_ACCUSED = 0.02  # of valid surveys, at most: two tests, each at 1 %
 
 
 def wall_of(job):
