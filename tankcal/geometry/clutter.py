@@ -18,6 +18,7 @@ MODES = 24  # highest mode of the form that the snooping allows for
 TAPER_M, RING_M = 0.010, 0.005  # prior sd of a radius: at the ends of a course; of a ring beside it
 FEWEST_OF_RING, WIDEST_GAP = 8, np.pi / 2  # points, and rad between two: they go round
 RING_SPAN, MIDDLE = 0.2, 0.15  # of half a course: between two rings; what is neither end
+MOST_ITERATIONS = 300  # each gains a tenth where coinciding limbs hardly determine a deep form
 REJECTED = 1e3  # factor on the sd of a rejected point: it is predicted, not fitted
 LEAST_NOISE_M = 1e-4  # a sound point is never rejected for less than a third of a millimetre
 
@@ -136,7 +137,8 @@ def _fit_form(xyz, course, uneven, axis, relative, slope_sd, accepted, before):
         was = noise, form
         doubt = np.maximum(1.0, np.abs(residual) / (2 * noise * relative))
         sd = noise * relative * np.where(accepted, doubt, REJECTED)
-        fit = adjust(*shell_problem(xyz, course, axis, sd, form, slope_sd, uneven))
+        problem = shell_problem(xyz, course, axis, sd, form, slope_sd, uneven)
+        fit = adjust(*problem, max_iterations=MOST_ITERATIONS)
         axis, residual = fit.unknowns[:4], fit.residuals[:n]
         noise = _noise(residual[accepted] / relative[accepted], fit.redundancy[:n][accepted])
         form = max(form * _component(fit, slice(n, n + 4 * (MODES - 1))), 0.1 * noise)
