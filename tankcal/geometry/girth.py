@@ -31,7 +31,7 @@ SHORTEST_WAVE_M = 0.2  # along the arc: plates do not bend more sharply
 DRAWS, NODES_OF_WAVE = 64, 8  # walls drawn, and nodes of an outline in its shortest wave
 TANGENTS, REACH = 128, 8  # of each wall, and the part of a turn to either side that they may touch
 FREE_M, LEAST_M = 1.0, 1e-6  # sd of radius and centre of a ring beforehand; of its readings, least
-MOST_RINGS = 8  # asked what a wall looks like
+MOST_RINGS, FEW_RINGS = 8, 4  # asked what a wall looks like; of tangents, a parabola joins them
 LEVELS = np.array([0.0, 0.5, 1.0])  # parts of the shell's height at which hulls are measured
 
 
@@ -221,8 +221,8 @@ def tangent_excess(amplitudes, radius_m, up, rings=(), most_m=np.inf):
     True
     """
     spectra = mode_shares(modes_of(radius_m), radius_m)
-    known = _known_rings(rings, radius_m) or [_Unread(up) for up in LEVELS]
-    drawn = _drawn_variances(amplitudes, np.random.default_rng(0))[:: 1 + len(known) // 4]
+    known = _known_rings(rings, radius_m, FEW_RINGS) or [_Unread(up) for up in LEVELS]
+    drawn = _drawn_variances(amplitudes, np.random.default_rng(0))[:: max(len(known) // 2, 1)]
     likely, circle, found = amplitudes.likely_m2, np.full(nodes_of(radius_m), radius_m), []
     for one in known:
         seen = _at_tangents(one.moved(circle, _bounded(_sizes_of(likely, one.up), most_m)))
@@ -243,11 +243,11 @@ def tangent_excess(amplitudes, radius_m, up, rings=(), most_m=np.inf):
     return smoothed
 
 
-def _known_rings(rings, radius_m):
-    """`_Known` of at most MOST_RINGS of the rings."""
+def _known_rings(rings, radius_m, most=MOST_RINGS):
+    """`_Known` of at most so many of the rings."""
     nodes = nodes_of(radius_m)
     turn = FULL_TURN * np.arange(nodes) / nodes
-    chosen = np.unique(np.linspace(0, len(rings) - 1, MOST_RINGS).astype(int)) if rings else ()
+    chosen = np.unique(np.linspace(0, len(rings) - 1, most).astype(int)) if rings else ()
     return [_Known(rings[i], turn, radius_m) for i in chosen]
 
 
