@@ -131,13 +131,15 @@ def table_of_limbs(job, poses, tools, amplitudes=None):
     return wall, compute_table(job, wall).table, touching
 
 
-def seen_as_planned(job, poses, wall):
-    """The job with sights past a circle of the nominal size about the axis that it found."""
+def seen_as_planned(job, poses, wall, touching):
+    """The job with sights past a circle of the nominal size about the axis that it found, at the
+    heights where they touched: those of a wall that is not round scatter about their levels.
+    """
     tangents, (x, y) = job.tangents, wall.shell.axis_m
     place = poses.place_of(tangents)
     station = poses.xyz_m[place] - [x, y, 0]
     radius = job.tank.nominal_diameter_m / 2
-    z = job.datum.bottom_z_m + job.datum.plate_level_m + tangents.level_m
+    z = touching.points.xyz_m[:, 2]
     sights = [
         tangent_sight(*one)
         for one in zip(station, z, z * 0 + radius, tangents.is_right, strict=True)
@@ -155,8 +157,8 @@ def test_u_of_tangents_is_that_of_a_job_but_for_the_amplitudes_that_it_learns(tm
         rng = np.random.default_rng(3)
         wall = make_wall(rng, family, radius_m=7.5, courses=6)
         job, *known = tangent_job(rng, wall, folder=tmp_path / "limbs", stations=8)
-        found, table, _ = table_of_limbs(job, *known)
-        planned = seen_as_planned(job, known[0], found)
+        found, table, touching = table_of_limbs(job, *known)
+        planned = seen_as_planned(job, known[0], found, touching)
         _, foreseen, _ = table_of_limbs(planned, *known, found.field.amplitudes)
         rows = slice(10, min(len(table.U_m3), len(foreseen.U_m3)))
         ours = table.U_m3[rows] / table.volume_m3[rows]
@@ -182,9 +184,9 @@ def test_u_of_tangents_on_generated_walls_study(tmp_path, figure):
             rng = np.random.default_rng(seed)
             wall = make_wall(rng, family, radius_m=7.5, courses=6)
             job, *known = tangent_job(rng, wall, folder=tmp_path / "limbs", stations=8)
-            found, table, _ = table_of_limbs(job, *known)
+            found, table, touching = table_of_limbs(job, *known)
             planned, amplitudes = (
-                seen_as_planned(job, known[0], found),
+                seen_as_planned(job, known[0], found, touching),
                 assumed_amplitudes(smoothed=True),
             )
             first, _, _ = table_of_limbs(planned, *known, amplitudes)
