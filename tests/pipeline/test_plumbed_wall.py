@@ -319,7 +319,6 @@ PLANTED = {
     "line_apart": other_end_of_one,
     "offsets_small": centimetres,
     "straps_apart_by_lines": misread_by_a_decimetre,
-    "too_small_for_lines": lambda parts: parts.settings.update({"tank.nominal_diameter_m": 7.9}),
 }
 
 
@@ -334,6 +333,15 @@ def test_planted_errors_are_named(tmp_path, code):
     parts = cones(sd_m=3e-4)
     PLANTED[code](parts)
     assert code.split()[0] in told_of(parts, tmp_path)
+
+
+@pytest.mark.slow
+def test_a_nominal_tank_of_another_size_is_refused(tmp_path):
+    """Planted: 7.9 m on the drawing of a tank of 10.5 m."""
+    parts = cones(sd_m=3e-4)
+    parts.settings["tank.nominal_diameter_m"] = 7.9
+    with pytest.raises(InputError, match=r"1\.32 to 1"):
+        told_of(parts, tmp_path)
 
 
 @pytest.mark.slow

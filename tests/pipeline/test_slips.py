@@ -305,7 +305,8 @@ OF_KIND = [
     ("sphere points", {"points": ball((3.281, 3.281, 3.281))}, "reference_below_top",
      "datum.reference_height_m"),
     ("sphere points", {"points": ball((3.281, 3.281, 3.281))}
-     | settings(tank__nominal_diameter_m=20.0), "points_too_wide", "x_m"),
+     | settings(tank__nominal_diameter_m=20.0), "size_in_other_unit",
+     "tank.nominal_diameter_m"),
     ("sphere points", {"points": ball((1.1, 1.1, 1.1))} | settings(tank__nominal_diameter_m=20.0),
      "points_unlike_drawing", "tank.nominal_diameter_m"),
     ("sphere points", {"points": ball((1.0, 1.0, 0.5))}, "points_make_no_shape", None),
