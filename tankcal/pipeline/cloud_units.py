@@ -13,7 +13,6 @@ from tankcal.messages import message
 FILE = "clouds.toml"
 SAMPLE, MOST_CHUNKS = 60_000, 8  # of a file: points that are looked at, pieces that are read
 DEFINED = {"e57": "m"}  # unit that a format defines, by ASTM E2807 for E57: no other is guessed
-SHOWN = ("cloud_too_sparse", "cloud_two_surfaces")  # refusals of walls that were found
 SAME = 1e-3  # of two units that points do not tell apart: feet and survey feet
 
 
@@ -36,7 +35,7 @@ def refusal_of_units(placing, sizes, refused):
     InputError
     """
     problems = []
-    if any(one.expected.code in SHOWN for one in refused.problems):
+    if any(one.expected.code == "cloud_two_surfaces" for one in refused.problems):
         return refused
     for number, file in enumerate(placing.files):
         units = units_of(file)
