@@ -43,8 +43,8 @@ def draw_departures(rng, sizes_m2, zeta, welds_rad, nominal_m, spans=None):
     count, courses = nodes_of(nominal_m), len(welds_rad)
     azimuth = np.arange(count) * FULL_TURN / count
     peaks = [weld_columns(azimuth, np.array(one, dtype=float), nominal_m).T for one in welds_rad]
-    low, high = np.transpose(spans_of(np.arange(courses + 1.0)) if spans is None else spans)
-    heights = [Heights(zeta, low[i] + (zeta + 1) / 2 * (high[i] - low[i])) for i in range(courses)]
+    spans = spans_of(np.arange(courses + 1.0)) if spans is None else spans
+    heights = [Heights.within(span, zeta) for span in spans]
     found = np.zeros((courses, len(zeta), count))
     for one, size in zip(COMPONENTS, sizes_m2, strict=True):
         if not size:

@@ -72,6 +72,12 @@ class Heights:
     def __getitem__(self, chosen):
         return Heights(self.zeta[chosen], self.up[chosen])
 
+    @classmethod
+    def within(cls, span, zeta):
+        """Heights zeta (n,) of courses between bottoms and tops (2,) or (n, 2) of the shell."""
+        low, high = np.transpose(span)
+        return cls(zeta, low + (np.asarray(zeta) + 1) / 2 * (high - low))
+
 
 @dataclass(frozen=True)
 class Component:

@@ -180,8 +180,8 @@ def _part(sites, radius_m, noise_m2, nominal_m, members, common, estimate_noise)
     own, level = [], seen(seams)
     for one in (COMPONENTS[i] for i in own_ones):
         if one.shape == "seam":
-            is_level = one.is_level
-            own.append(level if is_level else seen(seams * one.height_covariance(heights, heights)))
+            up = 1.0 if one.is_level else one.height_covariance(heights, heights)
+            own.append(level if one.is_level else seen(seams * up))
         else:
             there = left.T @ (welds if one.shape == "weld" else one.columns(waves, heights))
             own.append(there @ there.T)

@@ -88,8 +88,7 @@ class Sites:
 
     def heights_at(self, course, zeta):
         """`Heights` at places of courses: a number or (n,) of each."""
-        low, high = self.course_spans[course].T
-        return Heights(zeta, low + (np.asarray(zeta) + 1) / 2 * (high - low))
+        return Heights.within(self.course_spans[course], zeta)
 
     @property
     def seen(self):
