@@ -413,7 +413,6 @@ TABLE = (
         "stations that were left blank and assumed to be evenly spaced",
         "",
         ("places_assumed",),
-        verified=False,
     ),
     Plausible(
         "clouds.toml: s_translation_mm, s_rotation_arcsec",
