@@ -8,7 +8,6 @@ DIR/summary.*       of all jobs
 
 import json
 import os
-import shutil
 import socket
 import time
 import uuid
@@ -38,7 +37,7 @@ def opened_folder(out):
     folders.refuse_foreign(out, FILES)
     (out / JOBS).mkdir(parents=True, exist_ok=True)
     with open(out / LOCK, "a+", encoding="utf-8") as lock:
-        if not _lock(lock):
+        if not folders.lock_file(lock):
             lock.seek(0)
             text = message(
                 "batch_locked",
@@ -56,43 +55,12 @@ def opened_folder(out):
         yield journal
 
 
-def _lock(file):
-    """Lock a file until it is closed or this process ends; False: another process has it."""
-    try:
-        import fcntl
-    except ImportError:  # Windows
-        import msvcrt
-
-        try:
-            file.seek(0)
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
-        return True
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
-
-
 def _clear(jobs):
-    """Take away what an ended batch was writing: folders and files with a dot before the name."""
+    """Put right what an ended batch was writing."""
     for place in (jobs, *(one for one in jobs.iterdir() if one.is_dir())):
-        for left in place.glob(".*"):
-            if left.name.startswith(".tankcal-") and left.is_dir():
-                _bring_back(left, place)
-                shutil.rmtree(left, ignore_errors=True)
-            elif left.name.endswith(".tmp"):
-                left.unlink(missing_ok=True)
-
-
-def _bring_back(left, place):
-    """Results that were put aside when a batch was ended, between two renamings, are put back."""
-    if left.name.startswith(".tankcal-old-"):
-        for one in left.iterdir():
-            if not (place / one.name).exists():
-                one.rename(place / one.name)
+        folders.recover(place)
+        for left in place.glob(".*.tmp"):
+            left.unlink(missing_ok=True)
 
 
 class Journal:

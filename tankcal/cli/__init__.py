@@ -28,6 +28,7 @@ from tankcal.cli import (
 from tankcal.cli.help_words import argparse_in, put_in_words
 from tankcal.cli.machine import failure, print_json
 from tankcal.cli.showing import complain, speak, words_of_run
+from tankcal.cli.stopping import ended_by_signals, stopped_status
 from tankcal.errors import TankcalError
 from tankcal.messages import message
 
@@ -61,7 +62,8 @@ photographs, distances, angles and levels instead of surveyed points:
   tankcal plan my-plan                         what a survey will be worth, before it is made
 
 exit status: 0 done; 2 the input must be mended (one line per problem: file, row, column, what was
-expected; earlier results stay as they were); 3 the survey has no sound solution.
+expected; earlier results stay as they were); 3 the survey has no sound solution; 130 stopped by
+Ctrl-C, 143 by SIGTERM, 129 by closing the terminal.
 
 the job format: docs/job-format.md; axes, signs and units: docs/conventions.md"""
 
@@ -75,7 +77,8 @@ def main(arguments=None):
             options.shown.print_help()
             return 0
     try:
-        return options.command(options) or 0
+        with ended_by_signals():
+            return options.command(options) or 0
     except TankcalError as error:
         if getattr(options, "machine", False):
             print_json(**failure(error))
@@ -90,17 +93,11 @@ def main(arguments=None):
         print(f"tankcal: {error.filename or 'system'}: {error.strerror or error}", file=sys.stderr)
         return 2
     except BaseException as error:
-        if not _interrupted(error):
+        status = stopped_status(error)
+        if status is None:
             raise
-        complain(message("stopped", "stopped; nothing was written"))
-        return 130
-
-
-def _interrupted(error):
-    """Whether Ctrl-C is behind an error, however a library dressed it."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__context__
-    return error is not None
+        complain(message("stopped", "stopped; results are as they were, or whole new ones"))
+        return status
 
 
 def _options(arguments):

@@ -16,10 +16,10 @@ from tankcal.cli.showing import (
     say,
     speak,
 )
+from tankcal.cli.stopping import stopped_status
 from tankcal.errors import TankcalError, problem_from
 from tankcal.messages import message
 
-INTERRUPTED = 130
 GIGABYTE = 1 << 30
 
 
@@ -114,11 +114,11 @@ def _batch(options):
             worker_bytes=int(options.worker_memory * GIGABYTE), language=language_of_run(),
             telling=told,
         )  # fmt: skip
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         told.show.end()
         complain(message("batch_stopped", "stopped; what was done is kept, and this goes on: "
                          "{command}", command=_command()))  # fmt: skip
-        return INTERRUPTED
+        return stopped_status(stop)
     except TankcalError:
         told.show.end()
         raise

@@ -128,6 +128,8 @@ def read_manifest(folder):
     ------
     InputError
         For a file that is no list of hashes.
+    OSError
+        For one that cannot be read.
     """
     path = Path(folder) / FILE
     if not path.is_file():
@@ -135,7 +137,7 @@ def read_manifest(folder):
     try:
         content = path.read_bytes() if path.stat().st_size <= MOST_BYTES else b"\xff"
         rows = content.decode("utf-8").splitlines()
-    except (OSError, ValueError):
+    except ValueError:
         raise InputError(Problem(FILE, _no_list())) from None
     digests, made_by, language, problems = {}, "", None, []
     for number, row in enumerate(rows, 1):

@@ -323,10 +323,12 @@ def test_a_lock_is_stale_after_kill_9(two):
 def test_what_an_ended_batch_left_is_taken_away(two):
     _, out = two
     jobs = out / "jobs"
-    (jobs / "T-0" / ".tankcal-abc").mkdir()
+    (jobs / "T-0" / ".tankcal-abc" / "made" / "results").mkdir(parents=True)
+    (jobs / "T-0" / ".tankcal-abc" / "lock").touch()
     (jobs / "T-0" / ".outcome.json.1.tmp").write_text("{")
-    aside = jobs / "T-1" / ".tankcal-old-abc"  # ended between two renamings
-    aside.mkdir()
+    aside = jobs / "T-1" / ".tankcal-abc" / "before"  # ended between two renamings
+    aside.mkdir(parents=True)
+    (aside.parent / "lock").touch()
     (jobs / "T-1" / "results").rename(aside / "results")
     assert again(two) == 0
     assert jobs_in(out, "begun") == ["T-0", "T-1"]

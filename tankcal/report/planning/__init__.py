@@ -46,6 +46,7 @@ def write(
         if design is not None and design.steps:
             (temporary / DESIGN).mkdir()
             _write(kind(design.prediction, language), temporary / DESIGN, progress)
+        _refuse_filled(directory)  # meanwhile
     names = (*FILES, JOB, DESIGN)
     return [path for path in (Path(directory) / name for name in names) if path.exists()]
 
@@ -101,11 +102,16 @@ def _set(paper, folder, progress, prediction, sheets):
 
 def refuse_foreign(directory):
     """Raise InputError when `directory` holds anything but results of write(), as it left them."""
-    from tankcal.report.planning import empty_job
-
     directory = Path(directory)
     folders.refuse_foreign(directory, (*FILES, JOB, DESIGN))
-    empty_job.refuse_filled(directory / JOB, directory / "plan.json")
     if (directory / DESIGN).exists():
         folders.refuse_foreign(directory / DESIGN, (*FILES, JOB))
-        empty_job.refuse_filled(directory / DESIGN / JOB, directory / DESIGN / "plan.json")
+    _refuse_filled(directory)
+
+
+def _refuse_filled(directory):
+    """Raise InputError when a crew filled in an empty job of a plan."""
+    from tankcal.report.planning import empty_job
+
+    for folder in (Path(directory), Path(directory) / DESIGN):
+        empty_job.refuse_filled(folder / JOB, folder / "plan.json")
