@@ -6,7 +6,7 @@
 from dataclasses import dataclass
 from math import isfinite
 
-from tankcal.messages import Message, as_plain, message
+from tankcal.messages import Message, as_plain, message, printable
 
 SHEET = "sheet "  # how the file of a problem in a workbook begins
 
@@ -70,10 +70,10 @@ class Problem:
     @property
     def place(self):
         """Where it is, from the file to the column, as texts."""
-        place = [self.book] if self.book else []
+        place = [printable(self.book)] if self.book else []
         is_sheet = self.file.startswith(SHEET)
         name = self.file.removeprefix(SHEET)
-        place.append(sheet_named(name) if is_sheet else self.file)
+        place.append(sheet_named(name) if is_sheet else printable(self.file))
         if self.cell is not None:
             place.append(message("in_cell", "cell {cell}", cell=self.cell))
         elif self.row is not None:

@@ -3,7 +3,13 @@
 The English stands where a text is made; the other languages stand in their words, by the code.
 """
 
+import re
 import string
+
+# what a terminal obeys instead of showing it: C0, C1, directions of writing, separators of lines,
+# and halves of characters, which names of files that are no UTF-8 hold
+_OBEYED = "\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff"
+_CONTROL, _CONTROL_OR_BREAK = re.compile(f"[{_OBEYED}]"), re.compile(f"[{_OBEYED}\t\n]")
 
 
 class Message(str):
@@ -22,6 +28,24 @@ def message(code, template, **values):
     text = Message(fill_template(template, values))
     text.code, text.values = code, values
     return text
+
+
+def printable(text):
+    """A text with its control characters spelt out, so that no name of a file acts on a terminal.
+
+    >>> printable("a.csv\\x1b[2K")
+    'a.csv\\\\x1b[2K'
+    """
+    return _CONTROL_OR_BREAK.sub(_spell, str(text))
+
+
+def printable_lines(text):
+    """The same of a text that may have several lines."""
+    return _CONTROL.sub(_spell, str(text))
+
+
+def _spell(found):
+    return ascii(found[0])[1:-1]
 
 
 def list_some(names, most):
@@ -86,4 +110,4 @@ class _Filler(string.Formatter):
             return ", ".join(self.format_field(one, spec) for one in value)
         if isinstance(value, Message | dict):
             return self._said(value)
-        return value if isinstance(value, str) else self._number(value, spec)
+        return printable_lines(value) if isinstance(value, str) else self._number(value, spec)

@@ -30,7 +30,7 @@ from tankcal.cli.machine import failure, print_json
 from tankcal.cli.showing import complain, speak, words_of_run
 from tankcal.cli.stopping import ended_by_signals, stopped_status
 from tankcal.errors import TankcalError
-from tankcal.messages import message
+from tankcal.messages import message, printable, printable_lines
 
 DESCRIPTION = """\
 tankcal calibrates storage tanks: from surveyed points of the wall to the capacity
@@ -90,7 +90,8 @@ def main(arguments=None):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        print(f"tankcal: {error.filename or 'system'}: {error.strerror or error}", file=sys.stderr)
+        name = printable(error.filename or "system")
+        print(f"tankcal: {name}: {printable(error.strerror or error)}", file=sys.stderr)
         return 2
     except BaseException as error:
         status = stopped_status(error)
@@ -111,6 +112,13 @@ def _options(arguments):
     return options
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser that repeats no control character of its arguments."""
+
+    def _print_message(self, message, file=None):
+        super()._print_message(printable_lines(message), file)
+
+
 class _Version(argparse.Action):
     """Prints the version, which is looked for only then."""
 
@@ -128,7 +136,7 @@ def _parser():
 
 def _parser_in_english():
     """(the whole parser, what puts it into the language that is spoken)."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="tankcal",
         description=DESCRIPTION,
         epilog=EPILOG,

@@ -15,7 +15,7 @@ from tankcal.cli.showing import (
     warn,
 )
 from tankcal.errors import InputError, Problem
-from tankcal.messages import message
+from tankcal.messages import message, printable
 
 FIRST_WORDS = 200  # bytes
 
@@ -282,7 +282,7 @@ def read(options):
             reasons=f" ({reasons})" if refused else "",
         )
     )
-    print(f"  {found.path}\n  {found.refused_path}")
+    print(f"  {printable(found.path)}\n  {printable(found.refused_path)}")
 
 
 def _targets(count):

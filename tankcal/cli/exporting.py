@@ -12,7 +12,7 @@ from tankcal.cli.showing import (
     speak_of_record,
 )
 from tankcal.errors import InputError, Problem
-from tankcal.messages import message
+from tankcal.messages import message, printable
 
 
 def add(commands):
@@ -85,7 +85,7 @@ def _export(options):
     for line in export.lines:
         say(line)
     for path in paths:
-        print(f"  {path}")
+        print(f"  {printable(path)}")
     return 0
 
 

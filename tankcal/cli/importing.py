@@ -8,7 +8,7 @@ from tankcal.cli.arguments import add_language, positive, refuse_argument
 from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.showing import prepare_for_small_work, say, speak, warn
 from tankcal.errors import problem_of
-from tankcal.messages import message
+from tankcal.messages import message, printable
 
 
 def add(commands):
@@ -140,7 +140,7 @@ def _import(options):
     warn(found.warnings)
     say(message("import_wrote", "wrote into {folder}:", folder=str(options.out)))
     for path in found.paths:
-        print(f"  {path}")
+        print(f"  {printable(path)}")
     _say_next(Path(options.out), "total-station" if options.no_hits else "wall-hits")
 
 

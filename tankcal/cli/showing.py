@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from tankcal.errors import InputError
-from tankcal.messages import Message, message
+from tankcal.messages import Message, message, printable, printable_lines
 from tankcal.text.languages import DEFAULT, nearest_language
 from tankcal.text.time_left import how_far
 
@@ -60,7 +60,7 @@ def language_of_run():
 def say_in_language(text):
     """A text in the language that is spoken; one without a code is as it is."""
     if not (_spoken and isinstance(text, Message)):
-        return str(text)
+        return printable_lines(text)
     from tankcal.text.words import say as said_in
 
     return said_in(_spoken, text)
@@ -127,7 +127,7 @@ def print_paths(out, paths):
     """Print what was written."""
     say(message("results_in", "results in {folder}:", folder=str(out)))
     for path in paths:
-        print(f"  {path}")
+        print(f"  {printable(path)}")
 
 
 class Progress:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from tankcal.cli.showing import say, speak
 from tankcal.errors import InputError, Problem
-from tankcal.messages import message
+from tankcal.messages import message, printable
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
 
@@ -73,7 +73,7 @@ def _new(options):
     if options.workbook:
         path = write_input_workbook(directory, *form)
         say(message("wrote_workbook", "wrote {file}: fill it in, save it, then", file=str(path)))
-        print(f"  tankcal run {path}")
+        print(f"  tankcal run {printable(path)}")
         return
     write_starter(directory, *form)
     if is_filled_by_pen(options.survey):

@@ -6,7 +6,7 @@ from tankcal.cli.arguments import add_language
 from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.showing import Progress, prepare_for_small_work, say, speak_of_record
 from tankcal.errors import problem_of
-from tankcal.messages import message
+from tankcal.messages import message, printable
 
 
 def add(commands):
@@ -18,7 +18,8 @@ def add(commands):
         "against what the record gives when they are made again, the input files of the job, "
         "where it is at hand, against the hashes in the record, and every number of the record "
         "against the job computed again. One line a disagreement.",
-        epilog="exit status: 0 all agree; 2 something does not, or there is nothing to compare.",
+        epilog="exit status: 0 nothing disagrees; 2 something does, or there is nothing to "
+        "compare.",
     )
     verify.add_argument(
         "results",
@@ -84,6 +85,8 @@ def _print(found, status):
             "largest": None if again.largest is None else _finite(asdict(again.largest)),
             "agrees": again.agrees,
         },
+        compared_by_hash_alone=found.by_hash,
+        compared_by_numbers_alone=found.by_numbers,
         notes=[str(one) for one in found.notes],
         problems=[problem_of(one) for one in found.problems],
     )
@@ -160,21 +163,34 @@ def _numbers(again):
         )
 
 
+def _in_part(found):
+    """Which files were not compared with what they were made of."""
+    by_hash, by_numbers = (", ".join(map(printable, names))
+                           for names in (found.by_hash, found.by_numbers))  # fmt: skip
+    if by_hash:
+        yield message("verify_by_hash", "compared by their hash in SHA256SUMS alone, which anybody "
+                      "can write again: {files}", files=by_hash)  # fmt: skip
+    if by_numbers:
+        yield message("verify_by_numbers", "of another version of tankcal, compared by their "
+                      "numbers of five digits and more: {files}", files=by_numbers)  # fmt: skip
+
+
 def _sum(found):
     if found.problems:
         count = len(found.problems)
         text = message("verify_disagree", "{count} disagreements", count=count)
         say(message("verify_disagrees", "1 disagreement") if count == 1 else text)
         return
-    say(
-        message(
-            "verify_agree",
-            "{count} files compared, all agree: {file} is sha256:{digest}",
-            count=len(found.compared),
-            file=found.saved_file,
-            digest=found.digest or found.manifest_sha256,
-        )
-    )
+    values = {"count": len(found.compared), "file": found.saved_file,
+              "digest": found.digest or found.manifest_sha256}  # fmt: skip
+    if found.is_whole:
+        say(message("verify_agree", "{count} files compared, all agree: {file} is sha256:{digest}",
+                    **values))  # fmt: skip
+    else:
+        for text in _in_part(found):
+            say(text)
+        say(message("verify_agree_in_part", "{count} files agree as far as they were compared: "
+                    "{file} is sha256:{digest}", **values))  # fmt: skip
     if found.manifest_sha256 and found.digest:
         say(message("verify_manifest", "SHA256SUMS is sha256:{digest}",
                     digest=found.manifest_sha256))  # fmt: skip

@@ -63,6 +63,10 @@ class Verification:
         What came of computing the job again; None: it was not.
     notes : list of Message
         What could not be verified, and why.
+    made_again : set of str
+        Names of files that were compared with the same made or computed again.
+    by_hash, by_numbers : list of str
+        Names of files of which only the hash was compared, or only the numbers of many digits.
     """
 
     digest: str | None = None
@@ -74,6 +78,9 @@ class Verification:
     papers_again: bool = False
     recomputed: Recomputation | None = None
     notes: list[Message] = field(default_factory=list)
+    made_again: set[str] = field(default_factory=set)
+    by_hash: list[str] = field(default_factory=list)
+    by_numbers: list[str] = field(default_factory=list)
 
     def tell(self, name, text):
         """Add a disagreement: the file, and what is wrong with it."""
@@ -82,6 +89,12 @@ class Verification:
     def note(self, text):
         """Add something that could not be verified."""
         self.notes.append(text)
+
+    @property
+    def is_whole(self):
+        """Whether all was compared with what it was made of, and the record computed again."""
+        is_record = self.saved_file == RECORD
+        return not (self.by_hash or self.by_numbers) and (self.recomputed or not is_record)
 
     def is_told(self, name):
         """Whether something is wrong with a file."""
@@ -140,6 +153,8 @@ def _folder(found, folder, job, again):
         text = message("verify_no_record", "is missing; expected the record of the results")
         raise InputError(Problem(RECORD, text))
     _listed(found, folder, manifest)
+    proved = {*found.made_again, RECORD, TABLES}  # the record names the hash of its long tables
+    found.by_hash = [name for name in files_below(folder) if name not in proved]
 
 
 def _results(found, folder, job, again, manifest):
@@ -171,8 +186,10 @@ def _results(found, folder, job, again, manifest):
     def rebuild(place, language, letterhead):
         outputs.rebuild(folder / RECORD, place, again[1], language, letterhead)
 
-    if (folder / PAGES[0]).is_file():  # not of a run without papers
-        make_papers_again(found, folder, manifest, rebuild)
+    papers = (*PDFS, *WORKBOOKS, dcc.FILE, *PAGES)
+    if any((folder / name).is_file() for name in papers):  # not of a run without papers
+        versions = {"tankcal": record["tankcal"], **record["versions"]}
+        make_papers_again(found, folder, manifest, rebuild, versions)
 
 
 def _numbers(found, record, job, folder, again):

@@ -1,5 +1,6 @@
 """What `tankcal verify` makes again: the papers of a folder, byte for byte, and its numbers."""
 
+import re
 import tempfile
 from pathlib import Path
 
@@ -9,6 +10,8 @@ from tankcal.messages import message
 from tankcal.record import long_tables
 from tankcal.report import LETTERHEAD
 from tankcal.report import manifest as manifests
+from tankcal.report.paper_content import content_of_paper
+from tankcal.text.languages import LANGUAGES
 
 MOST_TOLD = 10  # numbers, or texts, that came out otherwise
 
@@ -29,8 +32,8 @@ def letterhead_of(folder):
     return Letterhead(data["name"], tuple(data["address"]), logo, data["colours"], mark)
 
 
-def make_papers_again(found, folder, manifest, rebuild):
-    """Tell `found` of each file that its saved file does not give again, byte for byte.
+def make_papers_again(found, folder, manifest, rebuild, versions=None):
+    """Tell `found` of each file that its saved file does not give again.
 
     Parameters
     ----------
@@ -39,33 +42,21 @@ def make_papers_again(found, folder, manifest, rebuild):
     manifest : Manifest or None
     rebuild : callable
         rebuild(folder to write, language, letterhead), from the saved file in `folder`.
+    versions : dict, optional
+        {"tankcal", "python", "numpy", "scipy": version} that computed the saved file.
 
-    Papers are compared where the manifest says that the same programs and packages made them, or
-    where there is none: then a file is only taken as made again when it is the same.
+    Where the same programs and packages made the papers, every byte is compared. SHA256SUMS says
+    so, and nobody signs it: what it calls the work of other versions is compared by its words and
+    numbers, and where it contradicts the saved file it is refused.
     """
-    if manifest is None:
-        found.note(
-            message(
-                "verify_papers_not_again",
-                "no SHA256SUMS says what made the papers: they were not made again",
-            )
-        )
-        return
-    if manifest.made_by != manifests.maker():
-        found.note(
-            message(
-                "verify_other_maker",
-                "the papers were made by other versions ({made_by}; here {here}): held against "
-                "SHA256SUMS only",
-                made_by=only_in(manifest.made_by, manifests.maker()),
-                here=only_in(manifests.maker(), manifest.made_by),
-            )
-        )
-        return
+    made_by = manifest.made_by if manifest else ""
+    _refuse_contradiction(found, made_by, versions)
+    is_same = made_by == manifests.maker()
     with tempfile.TemporaryDirectory(prefix="tankcal-") as place:
         again = Path(place) / "again"
+        language = manifest.language if manifest else language_of_page(folder)
         try:
-            rebuild(again, manifest.language, letterhead_of(folder))
+            rebuild(again, language, letterhead_of(folder))
         except InputError as error:
             found.problems += error.problems
             return
@@ -80,6 +71,8 @@ def make_papers_again(found, folder, manifest, rebuild):
             )
             return
         found.papers_again = True
+        if not is_same:
+            _note_other_maker(found, made_by)
         names = sorted({*manifests.files_below(folder), *manifests.files_below(again)})
         for name in names:
             if name in (COVARIANCE_FILE, long_tables.FILE, found.saved_file):
@@ -87,7 +80,10 @@ def make_papers_again(found, folder, manifest, rebuild):
             if not (again / name).is_file() or not (Path(folder) / name).is_file():
                 continue  # the manifest tells of what is missing or extra
             found.add_compared(name)
-            if not found.is_told(name) and not _same(again / name, Path(folder) / name):
+            found.made_again.add(name)
+            if found.is_told(name) or _same(again / name, Path(folder) / name):
+                continue
+            if is_same:
                 found.tell(
                     name,
                     message(
@@ -96,6 +92,96 @@ def make_papers_again(found, folder, manifest, rebuild):
                         file=found.saved_file,
                     ),
                 )
+            else:
+                _compare_content(found, name, Path(folder) / name, again / name, made_by)
+
+
+def language_of_page(folder):
+    """The language that the web page of a folder of results says it is in; None: it has none."""
+    path = Path(folder) / "report.html"
+    text = path.read_bytes()[:1000].decode("utf-8", "replace") if path.is_file() else ""
+    said = re.search(r'<html lang="([\w-]+)"', text)
+    return said[1] if said and said[1] in LANGUAGES else None
+
+
+def _refuse_contradiction(found, made_by, versions):
+    """Papers are not older than the record that they were made of."""
+    said = versions_in(made_by).get("tankcal")
+    if versions and said and _order(said) < _order(versions["tankcal"]):
+        found.tell(
+            manifests.FILE,
+            message(
+                "verify_older_papers",
+                "names tankcal {said} as what made the papers; {file} is of tankcal {version}, "
+                "and papers cannot be older than it",
+                said=said,
+                version=versions["tankcal"],
+                file=found.saved_file,
+            ),
+        )
+
+
+def _order(version):
+    """Numbers of a version, in their order: those of a release alone."""
+    return tuple(map(int, re.findall(r"\d+", version.partition("+")[0].partition(".dev")[0])))
+
+
+def versions_in(made_by):
+    """{name: version} of the line that says what made the files."""
+    parts = (part.split(" ", 1) for part in made_by.split(", ") if " " in part)
+    return {name: version for name, version in parts}
+
+
+def _note_other_maker(found, made_by):
+    if not made_by:
+        found.note(
+            message(
+                "verify_maker_unknown",
+                "no SHA256SUMS says what made the papers: their words and numbers were compared, "
+                "their pictures not",
+            )
+        )
+        return
+    found.note(
+        message(
+            "verify_other_maker",
+            "the papers were made by other versions ({made_by}; here {here}): their words and "
+            "numbers were compared, their pictures not",
+            made_by=only_in(made_by, manifests.maker()),
+            here=only_in(manifests.maker(), made_by),
+        )
+    )
+
+
+def _compare_content(found, name, path, again, made_by):
+    """Hold the words and numbers of a paper against those of the same made again."""
+    here = versions_in(manifests.maker())
+    there = versions_in(made_by)
+    same_version = there.get("tankcal", here["tankcal"]) == here["tankcal"]
+    ignored = {*here.values(), *there.values()} - {"-"}
+    try:
+        was, now = (content_of_paper(name, one.read_bytes(), ignored) for one in (path, again))
+    except ValueError:
+        found.tell(name, message("verify_unreadable", "cannot be read; expected a file of tankcal"))
+        return
+    apart = was.missing_in(now, same_version=same_version)
+    if not apart and same_version:
+        apart = now.missing_in(was, same_version=True)
+    if apart:
+        found.tell(
+            name,
+            message(
+                "verify_other_words",
+                "differs from what tankcal {version} makes of {file}, in {count} words or numbers; "
+                "the first: {first!r}",
+                version=here["tankcal"],
+                file=found.saved_file,
+                count=len(apart),
+                first=apart[0][:40],
+            ),
+        )
+    elif not same_version:
+        found.by_numbers.append(name)
 
 
 def only_in(one, other):
@@ -187,6 +273,7 @@ def _compare_covariance(found, path, adjustment):
         if not again.is_file():
             return
         found.add_compared(path.name)
+        found.made_again.add(path.name)
         if _same(again, path):
             return
         try:

@@ -15,7 +15,15 @@ from messages_told import lines
 import tankcal
 from tankcal.errors import Problem, problem_of
 from tankcal.job.rule_files import shipped_names, shipped_rule
-from tankcal.messages import as_plain, fields_of, join_with_and, list_some, message
+from tankcal.messages import (
+    as_plain,
+    fields_of,
+    join_with_and,
+    list_some,
+    message,
+    printable,
+    printable_lines,
+)
 from tankcal.record import record_of
 from tankcal.record.plain_data import to_plain
 from tankcal.text.languages import DEFAULT, LANGUAGES
@@ -238,3 +246,21 @@ def test_a_problem_is_plain_whatever_its_numbers_are():
     again = json.loads(json.dumps(plain, allow_nan=False))
     assert again["row"] == 2
     assert again["values"] == {"count": 3, "most": [1, 2], "part": None, "row": [1.5, 2.5]}
+
+
+OBEYED = ["\x1b[2K", "\r", "\x07", "\x9b2K", "\u202e", "\u2028", "\ud800", "\x85"]
+
+
+@pytest.mark.parametrize("mark", OBEYED)
+def test_what_a_terminal_obeys_is_spelt_out(mark):
+    text = message("problem", "{place}: {text}", place=[f"a{mark}b"], text=f"found {mark}")
+    assert mark not in text
+    assert mark not in printable(mark)
+    assert mark not in printable_lines(mark)
+    assert mark not in Problem(f"a{mark}", "is wrong").text
+
+
+def test_other_characters_are_printed_as_they_are():
+    assert printable("ção ñ 10¼ m³ 表 −") == "ção ñ 10¼ m³ 表 −"
+    assert printable("a\tb\nc") == "a\\tb\\nc"
+    assert printable_lines("a\tb\nc") == "a\tb\nc"
