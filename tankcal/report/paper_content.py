@@ -84,6 +84,10 @@ def _plain(content):
     return PICTURE.sub(" ", content.decode("utf-8", errors="replace"))
 
 
+def _of_cells(content):
+    return _plain(content).replace(",", "\n")
+
+
 def _of_pdf(content):
     import pypdf
 
@@ -130,4 +134,4 @@ class _Text(HTMLParser):
             self.parts.append(data)
 
 
-_READERS = {".pdf": _of_pdf, ".xlsx": _of_workbook, ".html": _of_page}
+_READERS = {".csv": _of_cells, ".pdf": _of_pdf, ".xlsx": _of_workbook, ".html": _of_page}
