@@ -18,7 +18,7 @@ from tankcal.batch.finding import BOOK
 from tankcal.job.folder import OF_INSPECTIONS
 from tankcal.job.tables import COVARIANCE_FILE, SETTINGS_FILE
 from tankcal.record import long_tables
-from tankcal.report.manifest import digest_of
+from tankcal.record.manifest import digest_of
 
 NEVER_READ = (  # endings of what lies beside jobs
     *(".jpg", ".jpeg", ".png", ".tif", ".tiff", ".gif", ".bmp", ".dng", ".raw", ".heic"),

@@ -11,6 +11,8 @@ from pathlib import Path
 
 from tankcal.batch.asked import FOLDERS, STEPS
 from tankcal.batch.kept_data import is_step
+from tankcal.errors import InputError
+from tankcal.record import manifest
 from tankcal.report.batch.paper import STATUSES
 
 JOBS, FILE, FORMAT = "jobs", "outcome.json", "tankcal-outcome/1"
@@ -100,8 +102,19 @@ def load_outcome(out, name):
 
 
 def _has_its_files(folder, step, outcome):
-    """Whether all that a step wrote is still there."""
-    return all((folder / FOLDERS[step] / name).is_file() for name in outcome.files)
+    """Whether all that a step wrote is still there, as SHA256SUMS lists it."""
+    if not outcome.files:
+        return True
+    place = folder / FOLDERS[step]
+    try:
+        listed = manifest.read_manifest(place)
+    except InputError:
+        return False
+    return listed is not None and all(
+        (place / name).is_file() and listed.digests.get(name) == manifest.digest_of(place / name)
+        for name in outcome.files
+        if name != manifest.FILE
+    )
 
 
 def save_outcome(out, outcome):

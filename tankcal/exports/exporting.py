@@ -174,11 +174,6 @@ def _check_table(file, record, log):
         text = message("export_bad_heights", "heights that do not rise row by row; expected two "
                        "rows or more that do, with a volume each")  # fmt: skip
         log.problem(file, text, None, "capacity.height_m")
-    elif np.any(np.diff(volume) < 0):
-        row = int(np.argmax(np.diff(volume) < 0)) + 1
-        text = message("export_falls", "the volume falls at the dip {at:.6g} m; expected volumes "
-                       "that do not fall", at=float(height[row]))  # fmt: skip
-        log.problem(file, text, None, "capacity.volume_m3")
     columns = ("k", "stated_U_m3")
     if any(len(getattr(record.capacity, one)) != len(height) for one in columns):
         text = message("export_columns", "columns of different lengths; expected one value a row")

@@ -3,9 +3,12 @@
 import json
 from pathlib import Path
 
+import numpy as np
+
 from tankcal.errors import InputError, Problem
 from tankcal.memory import without_collection
 from tankcal.messages import message
+from tankcal.record import manifest
 from tankcal.record.long_tables import attached, copy_record, split, without_tables
 from tankcal.record.plain_data import whole
 from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
@@ -16,6 +19,7 @@ __all__ = [
 ]  # fmt: skip
 
 ROWS_AT_ONCE = 1000  # of a table, as JSON
+VOLUME_ROUNDING = 1e-9  # of the fullest tank: what rounding may make a table fall
 _JSON = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
 
@@ -84,7 +88,7 @@ def _pieces(value):
         yield _JSON.encode(value)
 
 
-def load(path):
+def load(path, *, is_checked=True):
     """Read a record of this version, or of an older one, to which is added what it did not have.
 
     Tables of many rows, which stand in a file beside it, are read when they are asked for: then
@@ -94,6 +98,9 @@ def load(path):
     ----------
     path : path
         Of a record.json.
+    is_checked : bool, default True
+        Refuse a record that is not the file that SHA256SUMS beside it lists, and one whose volumes
+        are negative or fall.
 
     Returns
     -------
@@ -113,7 +120,47 @@ def load(path):
             "record_unreadable", "cannot be read as a record: {error}", error=str(error)
         )
         raise InputError(Problem(name, expected)) from error
-    return attached(migrated(record, name), path)
+    record = attached(migrated(record, name), path)
+    if is_checked:
+        _refuse_altered(Path(path))
+        _refuse_impossible(record, name)
+    return record
+
+
+def _refuse_altered(path):
+    """Raise InputError for a file that is not the one that SHA256SUMS beside it lists."""
+    try:
+        listed = manifest.read_manifest(path.parent)
+    except InputError:  # a list of other things
+        return
+    digest = listed.digests.get(path.name) if listed else None
+    if digest not in (None, manifest.digest_of(path)):
+        expected = message(
+            "record_altered",
+            "was altered after tankcal wrote it: its SHA-256 is not the one in {file}; expected "
+            "the file as it was: run the job again",
+            file=manifest.FILE,
+        )
+        raise InputError(Problem(path.name, expected))
+
+
+def _refuse_impossible(record, name):
+    """Raise InputError for a capacity table that no tank has."""
+    if record["capacity"] is None:
+        return
+    volumes = np.asarray(record["capacity"]["volume_m3"], dtype=float)
+    least = -VOLUME_ROUNDING * np.max(np.abs(volumes), initial=0.0)
+    falls = ~(np.diff(volumes, prepend=0.0) >= least)  # nan, too
+    if falls.any():
+        row = int(np.argmax(falls))
+        expected = message(
+            "record_impossible",
+            "has a capacity table that falls or is below 0 (row {row}: {volume} m3); expected "
+            "volumes that rise: run the job again",
+            row=row + 1,
+            volume=f"{volumes[row]:g}",
+        )
+        raise InputError(Problem(name, expected))
 
 
 def read(path, *, tables=True):

@@ -103,6 +103,11 @@ def with_next(block):
     return Block({**block.data, "with_next": True})
 
 
+def whole(block):
+    """The same table, which is no longer than a page, with all its rows on one."""
+    return Block({**block.data, "whole": True})
+
+
 def listing(items):
     """A list of sentences."""
     return Block({"kind": "list", "items": [_text(item) for item in items]})

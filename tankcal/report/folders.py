@@ -24,7 +24,7 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.report import manifest
+from tankcal.record import manifest
 
 PREFIX, LOCK, MADE, BEFORE, REST = ".tankcal-", "lock", "made", "before", "rest"
 NEW_S = 60  # a folder without a lock is so new that its process is about to lock it

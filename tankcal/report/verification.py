@@ -14,10 +14,10 @@ from tankcal.errors import InputError, Problem
 from tankcal.messages import Message, message
 from tankcal.record.long_tables import FILE as TABLES
 from tankcal.record.long_tables import problems_of_tables
+from tankcal.record.manifest import digest_of, files_below, read_manifest
 from tankcal.record.recomputation import Recomputation, input_folder
 from tankcal.report import dcc, outputs
 from tankcal.report.attachments import KINDS, sha256
-from tankcal.report.manifest import digest_of, files_below, read_manifest
 from tankcal.report.outputs import RECORD, WORKBOOKS
 from tankcal.report.verified_again import (
     compute_numbers_again,
@@ -159,7 +159,7 @@ def _folder(found, folder, job, again):
 
 def _results(found, folder, job, again, manifest):
     """A folder of results: by the hashes that its files name, its papers and numbers made again."""
-    record = records.load(folder / RECORD)
+    record = records.load(folder / RECORD, is_checked=False)
     found.digest = sha256((folder / RECORD).read_bytes())
     found.compared.append(RECORD)
     told = problems_of_tables(record)
@@ -258,7 +258,7 @@ def _file(found, path, job, again):
         for name, content in ((RECORD, held[RECORD]), (TABLES, tables)):
             if content is not None:
                 (Path(folder) / name).write_bytes(content)
-        record = records.load(Path(folder) / RECORD)
+        record = records.load(Path(folder) / RECORD, is_checked=False)
         told = problems_of_tables(record)  # reads them while they are there
     for name in WORKBOOKS:
         if name in held:

@@ -8,8 +8,8 @@ from tankcal.errors import InputError, TankcalError
 from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.messages import message
 from tankcal.record import long_tables
+from tankcal.record import manifest as manifests
 from tankcal.report import LETTERHEAD
-from tankcal.report import manifest as manifests
 from tankcal.report.paper_content import content_of_paper
 from tankcal.text.languages import LANGUAGES
 

@@ -13,9 +13,9 @@ from xml.etree import ElementTree
 import tankcal
 from tankcal.errors import InputError, Problem, TankcalError
 from tankcal.messages import message
+from tankcal.record.manifest import digest_of
 from tankcal.report import dcc
 from tankcal.report.attachments import sha256
-from tankcal.report.manifest import digest_of
 from tankcal.report.outputs import RECORD, tables
 from tankcal.report.workbook.book import RECORD_PROPERTY
 

@@ -14,7 +14,7 @@ from draws import draws
 
 from tankcal.cli import main
 from tankcal.cli.stopping import Ended, ended_by_signals, stopped_status
-from tankcal.report import manifest
+from tankcal.record import manifest
 from tankcal.report.folders import PREFIX
 
 needs_signals = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")

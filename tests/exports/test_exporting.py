@@ -225,7 +225,8 @@ def test_what_a_profile_cannot_take_is_refused(change, given, code, lying_record
 @pytest.mark.parametrize(
     ("height", "volume", "code"),
     [
-        ([0, 1, 2, 3], [0, 5, 4, 9], "export_falls"),
+        ([0, 1, 2, 3], [0, 5, 4, 9], "record_impossible"),
+        ([0, 1, 2, 3], [-1, 0, 4, 9], "record_impossible"),
         ([0, 1, 1, 3], [0, 5, 6, 9], "export_bad_heights"),
         ([0], [0], "export_bad_heights"),
     ],

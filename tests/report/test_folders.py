@@ -12,7 +12,8 @@ from contextlib import suppress
 
 import pytest
 
-from tankcal.report import folders, manifest
+from tankcal.record import manifest
+from tankcal.report import folders
 from tankcal.report.folders import MADE, PREFIX, recover, replaced
 
 EVENTS = ("open", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.listdir", "os.scandir",

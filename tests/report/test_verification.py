@@ -18,8 +18,8 @@ from test_adjustment_outputs import write_station
 import tankcal
 from tankcal.cli import main
 from tankcal.errors import InputError
+from tankcal.record.manifest import PACKAGES
 from tankcal.report.comparison import write_comparison
-from tankcal.report.manifest import PACKAGES
 from tankcal.report.verification import verify
 
 pytestmark = pytest.mark.slow

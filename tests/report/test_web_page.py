@@ -229,7 +229,8 @@ def test_the_digits_are_those_of_every_paper(browser, tmp_path, marks):
     assert browser.run(f"{json.dumps(spread)}.map(decimalsOf)") == [decimals_of(u) for u in spread]
 
 
-def test_rows_are_found_by_dip_or_number(browser, report):
+def test_rows_are_found_by_dip_or_number(browser, report, record):
+    capacity = record["capacity"]
     browser.open(report)
     visible = "[...document.querySelectorAll('.pieces tbody tr')].filter(row => !row.hidden)"
     texts = f"{visible}.map(row => row.cells[0].textContent.trim())"
@@ -237,7 +238,8 @@ def test_rows_are_found_by_dip_or_number(browser, report):
     assert browser.run(texts) == [f"4.2{n}0" for n in range(10)]
     browser.type(".finder input", "4.235")  # between two rows
     assert browser.run(texts) == ["4.230", "4.240"]
-    browser.type(".finder input", "624.705")
+    row = capacity["height_m"].index(4.75)
+    browser.type(".finder input", f"{capacity['volume_m3'][row]:.3f}")
     assert browser.run(texts) == ["4.750"]
     browser.type(".finder input", "north")
     assert browser.text(".finder output") == "No row has north."

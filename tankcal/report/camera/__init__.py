@@ -10,8 +10,9 @@ from pathlib import Path
 
 from tankcal import report
 from tankcal.messages import message
+from tankcal.record import manifest
 from tankcal.record.camera_versions import KINDS
-from tankcal.report import folders, manifest
+from tankcal.report import folders
 from tankcal.report.camera.paper import CameraPaper, made_from
 from tankcal.report.outputs.csv_files import write_rows
 from tankcal.report.terminal import lines_of

@@ -6,9 +6,8 @@ Nothing here computes a number: all of it is made from comparison.json.
 from functools import partial
 
 from tankcal.messages import message
-from tankcal.record import save
+from tankcal.record import manifest, save
 from tankcal.record.comparison import COMPARISON, plain_of_comparison
-from tankcal.report import manifest
 from tankcal.report.comparison.paper import FILE, WORKBOOK, ComparisonPaper
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL
 from tankcal.report.saved_folder import SavedFolder, write_pages

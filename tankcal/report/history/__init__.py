@@ -6,9 +6,8 @@ Nothing here computes a number: all of it is made from history.json.
 from functools import partial
 
 from tankcal.messages import message
-from tankcal.record import save
+from tankcal.record import manifest, save
 from tankcal.record.history import HISTORY, plain_of_history
-from tankcal.report import manifest
 from tankcal.report.history.paper import FILE, WORKBOOK, HistoryPaper
 from tankcal.report.history.tables import (
     CERTIFICATES,

@@ -7,9 +7,8 @@ capacity certificate.
 from functools import partial
 
 from tankcal.messages import message
-from tankcal.record import save
+from tankcal.record import manifest, save
 from tankcal.record.inspection import INSPECTION, plain_of_inspection
-from tankcal.report import manifest
 from tankcal.report.inspection.paper import FILE, WORKBOOK, InspectionPaper
 from tankcal.report.saved_folder import SavedFolder, write_pages
 

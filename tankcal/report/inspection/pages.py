@@ -40,13 +40,15 @@ def pages(paper, folder=None):
 def ending_together(made):
     """The blocks, the last table on one page with the table or figure before it.
 
-    Alone, its few rows would leave the last page nearly empty. A long table goes on from page to
-    page.
+    Alone, its few rows would leave the last page nearly empty, and so would the last of them. A
+    long table goes on from page to page.
     """
     shown = [i for i, block in enumerate(made) if block.data["kind"] in SHOWN]
     if len(shown) < 2:
         return made
     first, last = shown[-2:]
+    if SHORT < len(made[last].data.get("rows", ())) <= 2 * SHORT:
+        made = [*made[:last], blocks.whole(made[last]), *made[last + 1 :]]
     before = made[first].data
     if len(before.get("rows", ())) > SHORT * before.get("across", 1):
         return made

@@ -12,8 +12,8 @@ from tankcal.errors import CellError, InputError, Problem, TankcalError, Vocabul
 from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.memory import without_collection, without_looking_back
 from tankcal.messages import message
-from tankcal.record import long_tables
-from tankcal.report import dcc, folders, manifest
+from tankcal.record import long_tables, manifest
+from tankcal.report import dcc, folders
 from tankcal.report.attachments import sha256
 from tankcal.report.outputs import tables
 from tankcal.text.languages import LANGUAGES

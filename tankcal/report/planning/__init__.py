@@ -6,7 +6,8 @@ Nothing here computes a number.
 from pathlib import Path
 
 from tankcal.messages import message
-from tankcal.report import folders, manifest
+from tankcal.record import manifest
+from tankcal.report import folders
 from tankcal.report.planning.paper import PlanPaper
 
 __all__ = ["DESIGN", "FILES", "JOB", "PlanPaper", "refuse_foreign", "write"]
