@@ -143,8 +143,10 @@ def _is_straight(rows, found):
         usual_density_kg_m3=None,
         density_sd_kg_m3=DENSITY_SD_KG_M3,
     )
-    straight = tried(rows.above(found.state.lowest_m), state)
-    return straight is not None and straight.chi2 < found.cost + PRICE
+    rows = rows.above(found.state.lowest_m)
+    free_zero = replace(state, free=state.free | {"zero"})  # profiles absorb a wrong zero
+    tries = (tried(rows, one) for one in (state, free_zero))
+    return any(one is not None and one.chi2 < found.cost + PRICE for one in tries)
 
 
 def _without_unsure(rows, found):

@@ -19,6 +19,7 @@ from tankcal.tank.capacity import Capacity
 
 ROWS, DELIVERIES, DELIVERED_M = 10, 5, 2.0
 TOTAL = ROWS - 1
+FULL = 78  # splits in halves; of fewer the part beyond U is known less well
 
 pytestmark = pytest.mark.study
 
@@ -86,15 +87,17 @@ def test_halves_agree_within_their_u(survey, figure):
     """E_n of one half against the other: rms of 2 E_n is 1 where U is right."""
     rng, count = np.random.default_rng(1), len(survey.job.points.names)
     en = []
-    for _ in range(draws(13, 78)):
+    for _ in range(draws(13, FULL)):
         half = rng.permutation(count) < count // 2
         (one, one_u), (other, other_u) = survey.table_of(half), survey.table_of(~half)
         en.append((one - other) / np.hypot(one_u, other_u))
     for name, part in (("rows", np.array(en)[:, :ROWS]), ("deliveries", np.array(en)[:, ROWS:])):
-        beyond, scatter = np.mean(np.abs(part) > 1), np.sqrt(np.mean((2 * part) ** 2))
+        shares = np.mean(np.abs(part) > 1, axis=1)  # of each split: its volumes are correlated
+        beyond, its_sd = shares.mean(), shares.std(ddof=1) / np.sqrt(len(shares))
+        scatter = np.sqrt(np.mean((2 * part) ** 2))
         figure(f"halves, {name}: part with |E_n| > 1, rms of 2 E_n", f"{beyond:.3f} {scatter:.2f}")
         assert 0.8 < scatter < 1.3
-        assert beyond < 0.10
+        assert beyond < 0.10 + 2 * its_sd * (len(shares) < FULL)
 
 
 def test_rings_at_one_height_are_within_u(survey, whole, zeta, figure):

@@ -225,7 +225,9 @@ def test_u_of_jobs_on_generated_walls_study(tmp_path, figure):
                 ratios.append(u / foresee_table(nominal, amplitudes).made.table.U_m3[-1])
         figure(f"U of jobs by {kind} over that of their plans", np.round(np.median(ratios), 2))
         assert 0.7 < np.median(ratios) < 1.1
-        assert np.max(ratios) < 1.35
+        # by hits of one set-up on a wall with 7 mm of ovality, which a plan does not assume: 1.53;
+        # 1.25 before the wall had settlement, which shares that ovality until a fit of it is sure
+        assert np.max(ratios) < 1.6
 
 
 @pytest.mark.slow
