@@ -76,6 +76,7 @@ def blocks_of(grid):
     """Tuple of `Block` of a grid; a text without headings is one block of columns 1 and 2."""
     rows = list(grid.rows)
     found, start, is_parts, end = [], None, False, 0
+    first_pages = {}
     index = 0
     while index < len(rows):
         cells = rows[index][1]
@@ -100,6 +101,7 @@ def blocks_of(grid):
         if not pairs:
             index += 1
             continue
+        pairs = _as_first_page(pairs, wide, first_pages)
         found.append((first, pairs, heading, is_parts, index if start is None else start, wide))
         is_parts, start, index, end = False, None, first, first
     if not found:
@@ -127,6 +129,22 @@ def _block(grid, pairs, rows, is_parts, heading, wide):
         problem = refused_columns(grid.name, body, pairs, *heading)
         problems += [] if problem is None else [problem]
     return Block(pairs, width, rows, is_parts, heading, None, tuple(problems))
+
+
+def _as_first_page(pairs, wide, first_pages):
+    """The pairs, with the units that a title over the first page alone names.
+
+    first_pages  {texts of a heading: its pairs}, added to
+    """
+    heights = tuple(pair.height_heading.text for pair in pairs)
+    volumes = wide.texts if wide else tuple(pair.volume_heading.text for pair in pairs)
+    before = first_pages.setdefault((heights, volumes), pairs)
+    return tuple(
+        pair
+        if pair.volume_heading.unit is not None or pair.volume_heading.named.complaint
+        else replace(pair, volume_heading=first.volume_heading)
+        for pair, first in zip(pairs, before, strict=True)
+    )
 
 
 def _is_over_wide(rows, index, above):

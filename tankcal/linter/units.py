@@ -451,8 +451,8 @@ def _unusable(unit, kind, dimension):
         expected = "m3, L, hL, bbl, US gal, imp gal, ft3"
     return message(
         "lint_unusable_unit",
-        "found the unit {unit}, {meaning}; expected a heading with one of the units {units}: convert "
-        "the column, or correct the heading",
+        "found the unit {unit}, {meaning}; expected a heading with one of the units {units}: "
+        "convert the column, or correct the heading",
         unit=unit,
         meaning=kind,
         units=expected,

@@ -221,7 +221,9 @@ def test_a_title_names_the_unit_where_the_heading_does_not(tmp_path):
     report = lint(write(tmp_path, "All volumes in imperial gallons\n" + gallons))
     assert report.findings == ()
     assert "total 57.127849 m3" in report.summaries[0]
-    plain = lint(write(tmp_path, "Tank 5 of 50000 L capacity\n" + body.replace("e\n", "e (L)\n", 1)))
+    plain = lint(
+        write(tmp_path, "Tank 5 of 50000 L capacity\n" + body.replace("e\n", "e (L)\n", 1))
+    )
     assert "total 12.56637 m3" in plain.summaries[0]
 
 
