@@ -15,7 +15,9 @@ from tankcal.messages import message
 from tankcal.tank.dips import dip_label
 
 _READ_AS = {"dip": "height", "ullage": "ullage", "increments": "height"}
-_UNITS_READ = {"m", "cm", "mm", "in", "ft", "m3", "L", "bbl", "gal", "hL"}  # by the linter
+_UNITS_READ = {one: one for one in ("m", "cm", "mm", "in", "ft", "m3", "L", "bbl", "hL", "ft3")} | {
+    "gal": "US gal"
+}  # names of units that the linter reads
 _FEW = 3  # rows that the linter needs
 _BY_NEIGHBOURS = ("lint_odd_volume", "lint_shifted", "lint_volumes_swapped", "lint_rough")
 _OF_UNITS = ("lint_no_units",)  # what it says of a heading without a unit
@@ -152,11 +154,12 @@ def _headings(profile):
     for column in profile.columns:
         if column in _READ_AS:
             unit = profile.increment if column == "increments" else profile.level_unit
-            unit = f"_{unit}" if unit in _UNITS_READ else ""
+            unit = f"_{_UNITS_READ[unit]}" if unit in _UNITS_READ else ""
             known.append("difference" if is_led else f"{_READ_AS[column]}{unit}")
             is_led = True
         elif column == "volume" or only_increments:
-            unit = f"_{profile.volume_unit}" if profile.volume_unit in _UNITS_READ else ""
+            unit = _UNITS_READ.get(profile.volume_unit)
+            unit = "" if unit is None else f"_{unit}"
             known.append(f"volume{unit}")
         else:
             known.append("difference")

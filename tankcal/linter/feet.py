@@ -3,6 +3,7 @@
     5' 3 3/16", 5 ft 3 3/16 in   marks say what is what
     5-3 3/16, 5-03-3/16, 5-3     feet and inches, a fraction where there is one
     5-03-03                      feet, inches, and eighths or sixteenths of an inch
+    10 1/4, 10¼, 10-1/4          inches, or another unit of the heading that is not feet
 
 The last part of the last one is of the unit that the heading names (ft-in-16, ft-in-8ths). Where
 the heading names none, a part of 8 or more somewhere in the column can only be a sixteenth; a
@@ -11,18 +12,23 @@ column of parts up to 7 may be either, and is asked about.
 
 import re
 from fractions import Fraction
+from unicodedata import normalize
 
 from tankcal.errors import HeightError, InputError, Problem
 from tankcal.job.tables import shown
 from tankcal.linter.headings import parts_of_inch
-from tankcal.linter.numbers import MOST_DECIMALS, Reading, has_digit
+from tankcal.linter.numbers import MOST_DECIMALS, Reading, has_digit, read_number
+from tankcal.linter.units import FOOT_M
 from tankcal.messages import message
 from tankcal.tank.dips import INCHES_PER_FOOT, METRES_PER_INCH, parse_dip
 
+_SAME = 1e-9
 _FEET_DECIMALS = 4  # of a metre, in a label with decimals of an inch
 _MARKS = ("'", '"', "\u2032", "\u2033", "\u2019", "\u201d", "ft")
 _FRACTION = re.compile(r"\d{1,3}-\d{1,2}(?:[ -]+\d{1,2}/\d{1,2})?", re.ASCII)
 _PARTS = re.compile(r"(\d{1,3})-(\d{1,2})-(\d{1,2})", re.ASCII)
+_WITH_FRACTION = re.compile(r"(?:(\d{1,4})(?:[ -]+| ?- ?))?(\d{1,2})/(\d{1,2})", re.ASCII)
+_VULGAR = re.compile("(\\d?)([¼-¾⅐-⅞])")
 _EIGHTHS, _SIXTEENTHS = 8, 16
 
 
@@ -38,7 +44,7 @@ def feet_reader(name, cells, heading, rows, log):
     Raises InputError where parts of an inch may be eighths or sixteenths.
     """
     cells = [(cell, row) for cell, row in zip(cells, rows, strict=True) if has_digit(cell)]
-    texts = [cell.strip() if isinstance(cell, str) else "" for cell, _ in cells]
+    texts = [_typed(cell) if isinstance(cell, str) else "" for cell, _ in cells]
     most, said = len(texts) / 2, parts_of_inch(heading.text)
     in_parts = [_PARTS.fullmatch(text) for text in texts]
     if sum(one is not None for one in in_parts) > most:
@@ -50,6 +56,56 @@ def feet_reader(name, cells, heading, rows, log):
     if marked > most or (is_told and in_fractions + marked > most):
         return _read_marks
     return None
+
+
+def fraction_reader(cells, heading, style):
+    """Function of a cell that gives its `Reading` in the unit of the heading; None without any.
+
+    cells    of the column of heights
+    heading  of that column: 10 1/4 under feet may be 10 ft 1/4 in, and is refused
+    style    of the plain numbers among them
+    """
+    if not any(number_with_fraction(cell) is not None for cell in cells):
+        return None
+    is_in_feet = heading.unit is not None and abs(heading.unit / FOOT_M - 1) < _SAME
+
+    def read(cell):
+        value = number_with_fraction(cell)
+        if value is None:
+            if isinstance(cell, str) and "/" in _typed(cell):
+                return Reading(None, complaint=_no_fraction(cell))
+            return read_number(cell, style)
+        if is_in_feet:
+            return Reading(None, complaint=_no_fraction(cell))
+        return Reading(float(value), cell.strip(), MOST_DECIMALS)
+
+    return read
+
+
+def number_with_fraction(cell):
+    """The Fraction of a cell such as 10 1/4, 10-1/4, 10¼ or 3/8; None of any other cell."""
+    found = _WITH_FRACTION.fullmatch(_typed(cell)) if isinstance(cell, str) else None
+    if found is None or not 0 <= int(found[2]) < int(found[3]):
+        return None
+    return int(found[1] or 0) + Fraction(int(found[2]), int(found[3]))
+
+
+def _no_fraction(cell):
+    return message(
+        "lint_no_fraction",
+        "found {found}; expected a number with a proper fraction, such as 10 1/4, or feet and "
+        "inches with their marks, such as 10' 4 1/2\"",
+        found=shown(cell),
+    )
+
+
+def _typed(text):
+    """A label with its fraction in figures: 10¼ as 10 1/4."""
+
+    def figures(found):
+        return f"{found[1]} " * bool(found[1]) + normalize("NFKD", found[2]).replace("\u2044", "/")
+
+    return _VULGAR.sub(figures, text.strip())
 
 
 def _parts_by_shape(name, in_parts, rows, log):
@@ -94,7 +150,7 @@ def _read_parts(cell, unit):
 
 
 def _read_marks(cell):
-    text = str(cell)
+    text = _typed(str(cell))
     try:
         decimals = _FEET_DECIMALS if "." in text else MOST_DECIMALS
         return Reading(parse_dip(text, "ft-in-16"), text, decimals)

@@ -5,16 +5,29 @@ row of units below it.
 """
 
 import re
-import unicodedata
 from dataclasses import dataclass
+
+from tankcal.linter.units import (
+    LENGTH,
+    NO_UNIT,
+    VOLUME,
+    Unit,
+    names_only_units,
+    plain_text,
+    size_of,
+    tokens_of,
+    unit_of,
+    without_prepositions,
+)
+from tankcal.messages import Message
 
 _HEIGHT = re.compile(
     "heights?|dips?|innage|levels?|gauge|depth|sounding|altura|nivel|cota|medida|medic(ao|ion)|"
-    "regua|sondagem|enchimento|profundida(de|d)|sonda|sondaje|regla|varilla|aforo"
+    "regua|sondagem|enchimento|profundida(de|d)|sonda|sondaje|regla|varilla|aforo|alt|niv|hgt|ht"
 )
 _ULLAGE = re.compile("ullage|outage|vacio|vazio|espaco")
 _VOLUME = re.compile(
-    "volumen?s?|capacity|capacidade?|quantity|quantidade|cantidad|contents?|conteudo|contenido"
+    "volumen?s?|vols?|capacity|capacidade?|quantity|quantidade|cantidad|contents?|conteudo|contenido"
 )
 _OTHER = re.compile(
     "u|k|sd|per|por|uncertainty|incerteza|incertidumbre|area|temperatur[ae]|densit[ya]|densidade?|"
@@ -27,61 +40,61 @@ _FACTOR = re.compile("coverage|abrangencia|cobertura")
 _OF_SOMETHING_ELSE = re.compile("radius|raio|radio|area|input|entrada|height|altura|dip")
 _COVERAGE = re.compile(r"\bk ?= ?(\d{1,2}(?:[.,]\d{1,4})?)", re.ASCII)
 _BOUND = re.compile("from|to|de|a|ate|desde|hasta")  # of an interval of volumes
-_RATE = re.compile(r"/ ?(mm|cm|dm|m|in|ft|pol)\b")
+_RATE = re.compile(r"(\w*)[ )\]]*/ ?(mm|cm|dm|m|in|ft|pol)\b")
+_SYMBOL = re.compile("h|hl")  # h/cm: a height in cm
 _FEET = re.compile("ft|foot|feet|pes|pies")
 _OF_INCH = re.compile(r"(?<![\d.,])(?:1/)?(8|16)(?![\d.,]|/)|(eighth|oitavo|octavo)|"
                       r"(sixteenth|dezesseis ?avo|dieciseisavo)", re.ASCII)  # fmt: skip
 _PARTS = re.compile("proportional|proporciona|interpola|milimetrica")
 
-HEIGHT_UNITS_M = (
-    (re.compile("m|met(re|er|ro)s?"), 1.0),
-    (re.compile("dm|decimet(re|er|ro)s?"), 0.1),
-    (re.compile("cm|centimet(re|er|ro)s?"), 0.01),
-    (re.compile("mm|mill?imet(re|er|ro)s?"), 0.001),
-    (re.compile("in|inch(es)?|pol(egadas?)?|pulgadas?"), 0.0254),
-    (re.compile("ft|foot|feet"), 0.3048),
-)
-VOLUME_UNITS_M3 = (
-    (re.compile("m3|cbm|kl"), 1.0),
-    (re.compile("l|lts?|ltr|lit(re|er|ro)s?|dm3"), 0.001),
-    (re.compile("hl|hectolit(re|er|ro)s?"), 0.1),
-    (re.compile("bbls?|barrels?|barril|barris|barriles"), 0.158987294928),
-    (re.compile("gal(lons?|ao|oes|on|ones)?"), 0.003785411784),
-)
-
 
 @dataclass(frozen=True)
 class Heading:
-    """What a heading says.
+    """Role and unit of a column by its heading.
 
-    role  "height", "ullage", "volume" or "" (something else)
-    unit  its size in m or m3; None when the heading names none
+    role   "height", "ullage", "volume" or "" (anything else)
+    named  the `Unit`; NO_UNIT of other roles
     """
 
     text: str
     role: str
-    unit: float | None
+    named: Unit = NO_UNIT
+
+    @property
+    def unit(self):
+        """Size of the unit in m or m3; None when the heading names none that can be used."""
+        return self.named.size
 
     @property
     def is_in_feet(self):
         """Whether it names feet."""
         return _any(_FEET, _words(self.text))
 
+    @property
+    def is_in_feet_and_inches(self):
+        """Whether it names both, as the heading of labels such as 5-3 does."""
+        return self.is_in_feet and (
+            self.role != "volume"
+            and len({size_of(w, LENGTH) for w in _words(self.text)} - {None}) > 1
+        )
+
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """What a heading of a column of uncertainties says.
+    """Kind and unit of a column of uncertainties by its heading.
 
     is_expanded  U; else the standard uncertainty u
     unit         size of its unit in m3; None when the heading names none
     in_percent   of the volume
     k            coverage factor that the heading names, or None
+    complaint    why the unit that is written cannot be used, or ""
     """
 
     is_expanded: bool
     unit: float | None
     in_percent: bool
     k: float | None
+    complaint: Message | str = ""
 
 
 def uncertainty_of(cell):
@@ -90,15 +103,18 @@ def uncertainty_of(cell):
         return None
     words, letters = _words(cell), re.findall(r"[A-Za-z]+", cell)
     is_named = _any(_UNCERTAINTY, words)
-    if not (is_named or letters[:1] in (["U"], ["u"])) or _RATE.search(_plain(cell)):
+    is_symbol = letters[:1] in (["U"], ["u"]) and words[:1] not in (["us"], ["uk"])
+    if not (is_named or is_symbol) or _is_rate(cell):
         return None
-    is_foreign = _any(_OF_SOMETHING_ELSE, words) or _unit(HEIGHT_UNITS_M, words) is not None
+    is_foreign = _any(_OF_SOMETHING_ELSE, words) or any(size_of(w, LENGTH) for w in words)
     if is_foreign or "/" in cell:
         return None
     is_standard = _any(_STANDARD, words) or (not is_named and letters[0] == "u")
-    k = _COVERAGE.search(_plain(cell))
+    k = _COVERAGE.search(plain_text(cell))
     k = None if k is None else float(k[1].replace(",", "."))
-    return Uncertainty(not is_standard, _unit(VOLUME_UNITS_M3, words), "%" in cell, k)
+    in_percent = "%" in cell
+    unit = NO_UNIT if in_percent else unit_of(_COVERAGE.sub(" ", plain_text(cell)), VOLUME)
+    return Uncertainty(not is_standard, unit.size, in_percent, k, unit.complaint)
 
 
 def is_coverage_factor(cell):
@@ -108,37 +124,51 @@ def is_coverage_factor(cell):
 
 
 def heading_of(cell):
-    """The `Heading` of a cell; a cell that is no text says nothing."""
+    """The `Heading` of a cell; without a role for a cell that is no text."""
     if not isinstance(cell, str):
-        return Heading("", "", None)
+        return Heading("", "")
     text, words = cell.strip(), _words(cell)
-    if not words or _RATE.search(_plain(cell)) or _any(_OTHER, words):
-        return Heading(text, "", None)
-    height_unit, volume_unit = _unit(HEIGHT_UNITS_M, words), _unit(VOLUME_UNITS_M3, words)
+    is_bare_unit = names_only_units(cell)
+    if not (words or is_bare_unit) or _is_rate(cell) or _any(_OTHER, words):
+        return Heading(text, "")
+    has_length = any(size_of(word, LENGTH) is not None for word in words)
+    has_volume = any(size_of(word, VOLUME) is not None for word in words)
     if _any(_ULLAGE, words):
-        return Heading(text, "ullage", height_unit)
-    is_bound = any(map(_BOUND.fullmatch, words)) and all(
-        _BOUND.fullmatch(word) or _unit(VOLUME_UNITS_M3, [word]) for word in words
+        return Heading(text, "ullage", unit_of(text, LENGTH))
+    has_number = any(char.isdigit() for token in tokens_of(text) for char in token[:1])
+    is_bound = (
+        not has_number
+        and any(map(_BOUND.fullmatch, words))
+        and all(_BOUND.fullmatch(word) or size_of(word, VOLUME) for word in words)
     )
     if is_bound:
-        return Heading(text, "", None)
-    if _any(_VOLUME, words) or (volume_unit is not None and not _any(_HEIGHT, words)):
-        return Heading(text, "volume", volume_unit)
-    if _any(_HEIGHT, words) or height_unit is not None:
-        return Heading(text, "height", height_unit)
-    return Heading(text, "", None)
+        return Heading(text, "")
+    is_height = _any(_HEIGHT, words)
+    if _any(_VOLUME, words) or (has_volume and not is_height):
+        return Heading(text, "volume", unit_of(text, VOLUME))
+    if is_height or has_length:
+        return Heading(text, "height", unit_of(text, LENGTH))
+    return Heading(text, "volume", unit_of(text, VOLUME)) if is_bare_unit else Heading(text, "")
+
+
+def _is_rate(text):
+    """Whether a heading is of volumes per height (L/cm); h/cm and ft/in are none."""
+    found = _RATE.search(plain_text(text))
+    if found is None:
+        return False
+    over = found[1]
+    is_height = _HEIGHT.fullmatch(over) or _ULLAGE.fullmatch(over) or _SYMBOL.fullmatch(over)
+    return not (is_height or size_of(over, LENGTH) is not None)
 
 
 def is_unit(cell):
-    """Whether a cell names a unit and nothing else."""
-    words = _words(cell) if isinstance(cell, str) else []
-    units = HEIGHT_UNITS_M + VOLUME_UNITS_M3
-    return bool(words) and all(_unit(units, [word]) is not None for word in words)
+    """Whether a cell names a unit, with its factor perhaps, and nothing else."""
+    return isinstance(cell, str) and names_only_units(cell)
 
 
 def parts_of_inch(text):
     """8 or 16 where a heading of feet and inches names eighths or sixteenths, else None."""
-    found = _OF_INCH.search(_plain(text)) if _any(_FEET, _words(text)) else None
+    found = _OF_INCH.search(plain_text(text)) if _any(_FEET, _words(text)) else None
     if found is None:
         return None
     return int(found[1]) if found[1] else 8 if found[2] else 16
@@ -146,25 +176,12 @@ def parts_of_inch(text):
 
 def announces_parts(cell):
     """Whether a cell announces proportional parts."""
-    return isinstance(cell, str) and _PARTS.search(_plain(cell)) is not None
-
-
-def _plain(text):
-    """Lower case, without accents, superscripts as digits."""
-    decomposed = unicodedata.normalize("NFKD", text)
-    return "".join(char for char in decomposed if not unicodedata.combining(char)).lower()
+    return isinstance(cell, str) and _PARTS.search(plain_text(cell)) is not None
 
 
 def _words(text):
-    plain = re.sub(r"metros? cubicos?|cubic met(re|er)s?|m\^3|\bm 3\b", "m3", _plain(text))
-    return re.findall(r"[a-z]+3?", plain)
+    return [token for token in without_prepositions(tokens_of(text)) if token[0].isalpha()]
 
 
 def _any(pattern, words):
     return any(pattern.fullmatch(word) for word in words)
-
-
-def _unit(units, words):
-    """Size of the last unit that is named."""
-    found = [size for word in words for pattern, size in units if pattern.fullmatch(word)]
-    return found[-1] if found else None

@@ -21,6 +21,7 @@ MOST_IN_FEW = 4  # parameters of a hypothesis that few rows may fit: a line and 
 BETTER_FACTOR = 6.0
 LEAST_SIZE = 2.5  # quanta
 POINTS_BETWEEN, TOUCH = 9, 0.02  # gap of curves that touch, seen at 9 points, over its largest
+_LEAST_FREE = 1e-6  # share of a block that the curve leaves free
 PRICE = 3.0  # of a parameter, in units of twice the log likelihood; about the log of the rows
 
 
@@ -168,7 +169,8 @@ def _blocks(curve, members, ends):
     maker, residuals = curve.residual_maker, curve.residuals
     moved = maker @ blocks
     norm = np.einsum("nk,nk->k", blocks, moved)
-    keep = norm > 1e-6
+    # relative: a row whose height is rounded has a small weight
+    keep = norm > _LEAST_FREE * np.einsum("nk,nk->k", blocks, blocks)
     first, end, moved, norm = first[keep], end[keep], moved[:, keep], norm[keep]
     size = residuals @ blocks[:, keep] / norm
     rss = np.maximum(curve.rss - size**2 * norm, 0.0)

@@ -1,33 +1,27 @@
-"""Where the heights and volumes of a table stand: headings, pairs across a page, pages.
+"""The tables of a grid: heights and volumes of each row, as they are read.
 
 A printed table repeats its pair of columns across the page, and its heading on every page. The
 pairs are read column by column or row by row, whichever lets the heights rise.
 """
 
-from dataclasses import dataclass, field, replace
-from itertools import pairwise, zip_longest
+import re
+from dataclasses import dataclass
+from itertools import pairwise
 
 from tankcal.errors import InputError, Problem
-from tankcal.linter.feet import feet_reader
-from tankcal.linter.headings import (
-    Uncertainty,
-    announces_parts,
-    heading_of,
-    is_coverage_factor,
-    is_unit,
-    uncertainty_of,
-)
-from tankcal.linter.numbers import (
-    Reading,
-    has_digit,
-    has_letter,
-    is_blank,
-    read_number,
-    style_of,
-)
+from tankcal.linter.blocks import blocks_of, trimmed
+from tankcal.linter.feet import feet_reader, fraction_reader
+from tankcal.linter.headings import Uncertainty
+from tankcal.linter.numbers import Reading, has_digit, read_number, style_of
+from tankcal.linter.units import INCH_M, plain_text
+from tankcal.linter.wide import wide_cells
 from tankcal.messages import message
 
 _FEW_SPLIT_ROWS = 5
+_FEWEST_MULTIPLES = 3  # volumes that a factor may be the rounding of
+_WHOLE = 1e-9
+_TOTAL = re.compile("(?:(?:grand|sub)[ -]?)?tota(?:ls?|is|les)|sum(?:a|as|me)?|soma|average|mean|"
+                    "media|promedio|maximum|maximo|end|fim|fin")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -58,6 +52,8 @@ class Table:
     has_heading    False: the first two columns were taken
     is_text        every number is text (CSV)
     uncertainty    what the heading of its uncertainties says; None: it has none
+    volume_choices sizes of a unit of volumes that has several meanings (gallons), m3
+    complaints     Problems of the heading for which the table cannot be read
     """
 
     name: str
@@ -68,144 +64,8 @@ class Table:
     has_heading: bool
     is_text: bool
     uncertainty: Uncertainty | None = None
-
-
-@dataclass(frozen=True)
-class Pair:
-    """Positions and headings of a column of heights and a column of volumes.
-
-    beside  {"uncertainty" or "k": position} of what stands beside them
-    uncertainty  what that heading says, or None
-    """
-
-    height: int
-    volume: int
-    height_heading: object
-    volume_heading: object
-    beside: dict = field(default_factory=dict)
-    uncertainty: Uncertainty | None = None
-
-
-@dataclass(frozen=True)
-class Block:
-    """The rows under one heading: pairs of each kind of volume, left to right."""
-
-    pairs: tuple[Pair, ...]
-    width: int
-    rows: tuple
-    is_parts: bool = False
-    has_heading: bool = True
-
-    @property
-    def kind(self):
-        return tuple((p.height_heading, p.volume_heading) for p in self.pairs)
-
-
-def blocks_of(grid):
-    """Tuple of `Block` of a grid; a text without headings is one block of columns 1 and 2."""
-    found, start, is_parts = [], None, False
-    rows = list(grid.rows)
-    index = 0
-    while index < len(rows):
-        cells = rows[index][1]
-        if not any(has_letter(cell) for cell in cells):
-            index += 1
-            continue
-        if any(announces_parts(cell) for cell in cells):
-            is_parts, start = True, index
-        cells, used = _with_units(rows, index)
-        pairs = _pairs(cells)
-        if pairs:
-            found.append(
-                (
-                    index + used,
-                    pairs,
-                    len(_trimmed(cells)),
-                    is_parts,
-                    index if start is None else start,
-                )
-            )
-            is_parts, start = False, None
-            index += used
-        else:
-            index += 1
-    if not found:
-        return _without_heading(rows) if grid.is_text else ()
-    ends = [heading_start for *_, heading_start in found[1:]] + [len(rows)]
-    return tuple(
-        Block(pairs, width, tuple(rows[first:end]), parts)
-        for (first, pairs, width, parts, _), end in zip(found, ends, strict=True)
-    )
-
-
-def _with_units(rows, index):
-    """(heading cells, rows used): a row of units below a heading belongs to it."""
-    cells = rows[index][1]
-    if index + 1 < len(rows) and any(heading_of(cell).role for cell in cells):
-        below = rows[index + 1][1]
-        named = [cell for cell in below if not is_blank(cell)]
-        if named and all(is_unit(cell) for cell in named):
-            joined = [
-                " ".join(str(part).strip() for part in both if not is_blank(part)) or None
-                for both in zip_longest(cells, below)
-            ]
-            return joined, 2
-    return cells, 1
-
-
-def _pairs(cells):
-    """Pairs of a heading: each run of heights, then volumes, gives the first height to each."""
-    headings = [heading_of(cell) for cell in cells]
-    pairs, heights, after_volume = [], [], False
-    for position, heading in enumerate(headings):
-        if heading.role in ("height", "ullage"):
-            if after_volume:
-                heights, after_volume = [], False
-            heights.append((position, heading))
-        elif heading.role == "volume" and heights:
-            dips = [one for one in heights if one[1].role == "height"] or heights
-            pairs.append(Pair(dips[0][0], position, dips[0][1], heading))
-            after_volume = True
-    return tuple(_with_uncertainty(pairs, cells))
-
-
-def _with_uncertainty(pairs, cells):
-    """Pairs with the columns of uncertainties and coverage factors that follow their volumes."""
-    starts = [min(pair.height, pair.volume) for pair in pairs if pair.height] + [len(cells)]
-    for pair in pairs:
-        end = min(start for start in starts if start > pair.volume)
-        end = min([end, *(other.volume for other in pairs if other.volume > pair.volume)])
-        said = {n: uncertainty_of(cells[n]) for n in range(pair.volume + 1, end)}
-        known = sorted((n for n in said if said[n]), key=lambda n: not said[n].is_expanded)
-        if not known:
-            yield pair
-            continue
-        beside = {"uncertainty": known[0]}
-        factors = [n for n in said if said[n] is None and is_coverage_factor(cells[n])]
-        if factors:
-            beside["k"] = factors[0]
-        yield replace(pair, beside=beside, uncertainty=said[known[0]])
-
-
-def _trimmed(cells):
-    cells = list(cells)
-    while cells and is_blank(cells[-1]):
-        cells.pop()
-    return cells
-
-
-def _column(number):
-    return message("lint_column", "column {number}", number=str(number))
-
-
-def _without_heading(rows):
-    body = [row for row in rows if all(has_digit(cell) for cell in row[1][:2]) and row[1][1:]]
-    if not body or len(body) < 0.5 * len(rows):
-        return ()
-    nothing = heading_of(None)
-    pair = Pair(0, 1, *(replace(nothing, text=_column(k)) for k in (1, 2)))
-    width = max(len(_trimmed(cells)) for _, cells in body)
-    return (Block((pair,), width, tuple(body), False, False),)
+    volume_choices: tuple[float, ...] = ()
+    complaints: tuple[Problem, ...] = ()
 
 
 def tables_of(grid, log):
@@ -227,7 +87,7 @@ def _kinds(pairs):
     kinds = {}
     for number, pair in enumerate(pairs):
         place = sum(other.height == pair.height for other in pairs[:number])
-        units = (pair.height_heading.unit, pair.volume_heading.unit)
+        units = (pair.height_heading.named, pair.volume_heading.named)
         kinds.setdefault((place, units), []).append(number)
     return list(kinds.values())
 
@@ -236,47 +96,131 @@ def _table(grid, blocks, numbers, log):
     cells = [_cells(grid, block, [block.pairs[k] for k in numbers], log) for block in blocks]
     by_column = [one for page in cells for column in page for one in column]
     orders = [by_column]
-    if len(numbers) > 1:
+    if len(numbers) > 1 or blocks[0].wide is not None:
         orders.append([one for page in cells for row in _by_row(page) for one in row])
     style = style_of([[one[3] for one in by_column], [one[4] for one in by_column]])
     first = blocks[0].pairs[numbers[0]]
     heights, rows = [one[3] for one in by_column], [one[0] for one in by_column]
     in_feet = feet_reader(grid.name, heights, first.height_heading, rows, log)
-    orders = [[_entry(one, style, in_feet) for one in order] for order in orders]
+    in_fractions = None if in_feet else fraction_reader(heights, first.height_heading, style)
+    orders = [[_entry(one, style, in_feet or in_fractions) for one in order] for order in orders]
     entries = min(orders, key=_turns)
+    height_m = 1.0 if in_feet else _height_unit(grid.name, first, in_fractions, entries, log)
+    complaints = [problem for block in blocks for problem in block.complaints]
+    if blocks[0].has_heading:
+        row = blocks[0].heading[0]
+        checked = () if in_feet else _complaints_of_heights(first, in_fractions, entries)
+        checked = [*checked, *_complaints_of_volumes(first, entries)]
+        complaints += [Problem(grid.name, text, row, column) for text, column in checked]
     return Table(
         grid.name,
         tuple(entries),
-        1.0 if in_feet else first.height_heading.unit,
+        height_m,
         first.volume_heading.unit,
         first.height_heading.role == "ullage",
         blocks[0].has_heading,
         grid.is_text,
         first.uncertainty,
+        first.volume_heading.named.choices,
+        tuple(dict.fromkeys(complaints)),
     )
+
+
+def _height_unit(name, pair, in_fractions, entries, log):
+    """Unit of the heights, m; fractions of a unit that no heading names are of inches."""
+    named = pair.height_heading.named
+    if not in_fractions:
+        return named.size
+    if named.is_named:
+        # 10 1/4 below "1/8 in" counts inches: the factor is the graduation
+        return None if named.size is None else named.size / min(named.factor, 1.0)
+    found = next(one for one in entries if "/" in one.height.text)
+    text = message(
+        "lint_by_inches",
+        "heights such as {found} are taken as inches: the heading names no unit",
+        found=found.height.text,
+    )
+    log.warning(name, text, found.row, found.height_column)
+    return INCH_M
+
+
+def _complaints_of_heights(pair, in_fractions, entries):
+    """(text, column) of a heading of heights that cannot be read."""
+    heading = pair.height_heading
+    if heading.named.complaint:
+        yield heading.named.complaint, heading.text
+    elif heading.is_in_feet_and_inches and not pair.parts:
+        text = message(
+            "lint_plain_feet",
+            "the heading names feet and inches, but the heights are plain numbers; expected "
+            "labels such as 5' 3 3/16\" or 5-3 3/16, or one column each",
+        )
+        yield text, heading.text
+    elif not in_fractions:
+        yield from _complaints_of_factor(heading, [entry.height for entry in entries])
+
+
+def _complaints_of_volumes(pair, entries):
+    heading = pair.volume_heading
+    if heading.named.complaint:
+        yield heading.named.complaint, heading.text
+    else:
+        yield from _complaints_of_factor(heading, [entry.volume for entry in entries])
+    if pair.uncertainty is not None and pair.uncertainty.complaint:
+        yield pair.uncertainty.complaint, None
+
+
+def _complaints_of_factor(heading, readings):
+    """(text, column) where a factor may as well be the rounding of the numbers: 10 L, 1/8 in."""
+    factor = heading.named.factor
+    values = [one.value for one in readings if one.value]
+    if factor == 1 or heading.named.is_multiplied or not values:
+        return
+    multiples = values if factor < 1 else [value / factor for value in values]
+    are_whole = [abs(value - round(value)) <= _WHOLE * max(1.0, abs(value)) for value in multiples]
+    is_rounding = all(are_whole) and len(set(values)) >= _FEWEST_MULTIPLES
+    if is_rounding if factor > 1 else not all(are_whole):
+        text = message(
+            "lint_factor_or_rounding",
+            "the heading has a factor of {factor:g}, but numbers such as {found} suggest that it "
+            "is the graduation or rounding; expected a heading with x before the factor, such as "
+            "(x 10 L), or with the unit alone",
+            factor=factor,
+            found=_example(readings, are_whole, factor),
+        )
+        yield text, heading.text
+
+
+def _example(readings, are_whole, factor):
+    """Text of a number that is no whole number of a graduation, or of the last multiple."""
+    texts = [one.text for one in readings if one.value]
+    return texts[-1] if factor > 1 else texts[are_whole.index(False)]
 
 
 def _cells(grid, block, pairs, log):
     """For each pair of columns the list of (row, two names, height, volume, what is beside)."""
+    if block.wide is not None:
+        rows = [row for row in block.rows if not _is_total(row[1], block.pairs[0])]
+        return wide_cells(grid.name, block.wide, rows, log)
     names = _names(block.pairs)
     columns = [[] for _ in pairs]
     _refuse_split_rows(grid, block)
     for row, cells in block.rows:
-        is_split = grid.is_text and len(_trimmed(cells)) > block.width
+        is_split = grid.is_text and len(trimmed(cells)) > block.width
         if is_split:
             expected = message(
                 "lint_split_row",
                 "{count} cells, expected {width} as in the heading (a decimal comma, or a "
                 "thousands mark?)",
-                count=len(_trimmed(cells)),
+                count=len(trimmed(cells)),
                 width=block.width,
             )
             log.problem(grid.name, expected, row)
         for column, pair in zip(columns, pairs, strict=True):
             height = cells[pair.height] if pair.height < len(cells) else None
             volume = cells[pair.volume] if pair.volume < len(cells) else None
-            if not has_digit(height) and not has_digit(volume):
-                continue  # a note between the rows
+            if not has_digit(height) and (not has_digit(volume) or _is_total(cells, pair)):
+                continue  # a note between the rows, or their total
             told = Reading(None) if is_split else None  # told already
             beside = {
                 what: cells[place] if place < len(cells) else None
@@ -288,16 +232,24 @@ def _cells(grid, block, pairs, log):
     return columns
 
 
+def _is_total(cells, pair):
+    """Whether a row without a height is named as a total, or another summary of the rows."""
+    if pair.height < len(cells) and has_digit(cells[pair.height]):
+        return False
+    words = (re.findall("[a-z-]+", plain_text(cell)) for cell in cells if isinstance(cell, str))
+    return any(bool(word) and _TOTAL.fullmatch(word[0]) is not None for word in words)
+
+
 def _refuse_split_rows(grid, block):
     """Raise InputError when the numbers themselves are split into cells, row after row."""
-    split = [(row, cells) for row, cells in block.rows if len(_trimmed(cells)) > block.width]
+    split = [(row, cells) for row, cells in block.rows if len(trimmed(cells)) > block.width]
     if grid.is_text and len(split) > max(_FEW_SPLIT_ROWS, 0.2 * len(block.rows)):
         row, cells = split[0]
         expected = message(
             "lint_split_rows",
             "{count} cells, expected {width} as in the heading, as in {more} more "
             "rows: write ; between the cells when decimals have a comma",
-            count=len(_trimmed(cells)),
+            count=len(trimmed(cells)),
             width=block.width,
             more=len(split) - 1,
         )
@@ -324,10 +276,10 @@ def _by_row(page):
     return [[column[k] for column in page if k < len(column)] for k in range(longest)]
 
 
-def _entry(cells, style, in_feet):
+def _entry(cells, style, read_height):
     row, height_name, volume_name, height, volume, beside = cells
     volume = volume if isinstance(volume, Reading) else read_number(volume, style)
-    height = in_feet(height) if in_feet else read_number(height, style)
+    height = read_height(height) if read_height else read_number(height, style)
     beside = {what: read_number(cell, style) for what, cell in beside.items()}
     return Entry(row, height_name, volume_name, height, volume, **beside)
 

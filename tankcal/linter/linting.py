@@ -228,10 +228,19 @@ def checked(
     tables = _tables(path.name, grids, sheet, log, choose)
     tables = [_declared(table, declared) for table in tables]
     longest = max(len(table.entries) for table in tables)
+    complaints = [
+        problem
+        for table in tables
+        if len(table.entries) >= _PART_OF_LARGEST * longest
+        for problem in table.complaints
+    ]
+    if complaints:
+        raise InputError(list(dict.fromkeys(complaints)))
     summaries, areas, found = [], None, []
     for table in tables:
         if len(table.entries) >= _PART_OF_LARGEST * longest:
-            one, summary, areas = _check(table, nominal, log, even_steps)
+            has_several = sum(other.name == table.name for other in tables) > 1
+            one, summary, areas = _check(table, nominal, log, even_steps, has_several)
             summaries.append(summary)
             found.append(one)
     for table in tables:
@@ -243,10 +252,14 @@ def checked(
 
 def _declared(table, declared):
     """The table with units that were declared, where its headings name none."""
+    choices = table.volume_choices
+    is_choice = not choices or declared.volume_m3 in choices
+    is_settled = bool(choices) and is_choice and declared.volume_m3 is not None
     return replace(
         table,
         height_unit_m=table.height_unit_m or declared.height_m,
-        volume_unit_m3=table.volume_unit_m3 or declared.volume_m3,
+        volume_unit_m3=table.volume_unit_m3 or (declared.volume_m3 if is_choice else None),
+        volume_choices=() if is_settled else choices,
     )
 
 
@@ -274,6 +287,9 @@ def _tables(file, grids, sheet, log, choose=None):
     if size and choose is not None:
         _, tables, told = found[choose([one[1] for one in found])]
     if size == 0:
+        refusals = [problem for *_, one in found for problem in one.problems]
+        if refusals:
+            raise InputError(refusals)
         expected = message(
             "lint_no_table",
             "no table found; expected a column of heights and a column of volumes, with headings "
@@ -285,8 +301,11 @@ def _tables(file, grids, sheet, log, choose=None):
     return tables
 
 
-def _check(table, nominal, log, even_steps):
-    """(CheckedTable, summary, (least, largest) area in m2) of one table, its faults told."""
+def _check(table, nominal, log, even_steps, has_several):
+    """(CheckedTable, summary, (least, largest) area in m2) of one table, its faults told.
+
+    has_several  the summary names the column of volumes, since the file has more of them
+    """
     if not table.has_heading:
         log.warning(
             table.name,
@@ -304,7 +323,7 @@ def _check(table, nominal, log, even_steps):
     summary = message(
         "lint_summary",
         "{table}: {rows} rows, {low:.6g} to {high:.6g} m, step {step:.6g} m, total {total:.9g} m3",
-        table=table.name,
+        table=f"{table.name}, {table.entries[0].volume_column}" if has_several else table.name,
         rows=len(volumes.volume),
         low=low,
         high=high,

@@ -20,6 +20,7 @@ _GROUPED = re.compile(r"\d{1,3}(?: \d{3})+(?:[.,]\d+)?")
 _MARKS = "*\u2020\u2021"  # of a footnote
 _MOSTLY = 0.6
 _LINES_OF_HEADING = 3
+_HALF = 0.5  # of the lines
 
 
 @dataclass(frozen=True)
@@ -172,6 +173,10 @@ def _joined(pages):
 
 
 def _headed(rows):
-    """The rows without the columns that have no heading."""
-    kept = [k for k, text in enumerate(rows[0][1]) if text]
+    """The rows without a column that has no heading; more of them are kept, to be refused."""
+    width = max(len(cells) for _, cells in rows)
+    texts = [rows[0][1][k] if k < len(rows[0][1]) else None for k in range(width)]
+    filled = [sum(k < len(cells) and bool(cells[k]) for _, cells in rows[1:]) for k in range(width)]
+    unnamed = [k for k in range(width) if not texts[k] and filled[k] > _HALF * (len(rows) - 1)]
+    kept = [k for k in range(width) if texts[k] or (len(unnamed) > 1 and k in unnamed)]
     return [(row, tuple(cells[k] if k < len(cells) else None for k in kept)) for row, cells in rows]

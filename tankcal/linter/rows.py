@@ -179,6 +179,14 @@ def _has_clear_units(one, declared, log):
         return False
     if None not in (one.table.height_unit_m, one.table.volume_unit_m3):
         return True
+    if one.table.volume_choices:
+        expected = message(
+            "former_gallons",
+            "gallons of no country, US or imperial; expected US gal or imp gal in the heading, or "
+            "volume_unit in former.toml",
+        )
+        log.problem(one.table.name, expected)
+        return False
     likely = likely_units(one.table, one.volumes)
     if len(likely) == 1:
         return True
@@ -195,10 +203,20 @@ def _has_clear_units(one, declared, log):
 def _agrees_with_headings(one, declared, log):
     """Whether units that were declared are those of the headings, where these name any."""
     told = len(log.problems)
+    choices = one.table.volume_choices
+    if choices and declared.volume_m3 is not None and declared.volume_m3 not in choices:
+        expected = message(
+            "lint_other_gallons",
+            "the heading names gallons; declared units of {declared:g} m3; expected US gal or imp "
+            "gal",
+            declared=declared.volume_m3,
+        )
+        log.problem(one.table.name, expected)
+        return False
     said = (("m", one.table.height_unit_m, declared.height_m),
             ("m3", one.table.volume_unit_m3, declared.volume_m3))  # fmt: skip
     for unit, named, given in said:
-        if given is not None and abs(named / given - 1) > _SAME_UNIT:
+        if given is not None and named is not None and abs(named / given - 1) > _SAME_UNIT:
             expected = message(
                 "lint_other_unit",
                 "the heading says units of {said:g} {unit}; declared {declared:g} {unit}",

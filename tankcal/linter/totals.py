@@ -45,6 +45,14 @@ NO_UNITS = Units(None, None)
 def units_of(table, volumes, log):
     """`Units` by the headings; where one is silent, those that give a tank of usual proportions."""
     pairs = _possible(table)
+    if table.volume_choices:  # volumes cannot tell gallons apart
+        pairs = [one for one in pairs if one.volume_m3 == table.volume_choices[0]]
+        told = message(
+            "lint_gallons",
+            "gallons of no country: taken as US gallons (3.7854 L); imperial gallons (4.54609 L) "
+            "give volumes 20 % larger; expected US gal or imp gal in the heading",
+        )
+        log.warning(table.name, told)
     units = min(pairs, key=lambda one: _oddity(volumes, one))
     if len(pairs) > 1:
         text = message(
@@ -66,6 +74,8 @@ def _possible(table):
     heights, sizes = _USUAL_HEIGHT_UNITS_M, _USUAL_VOLUME_UNITS_M3
     if table.height_unit_m is not None:
         heights = [table.height_unit_m]
+    if table.volume_choices:
+        sizes = list(table.volume_choices)
     if table.volume_unit_m3 is not None:
         sizes = [table.volume_unit_m3]
     return [Units(*pair) for pair in product(heights, sizes)]

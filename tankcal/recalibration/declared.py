@@ -13,6 +13,7 @@ from tankcal.job.fields import Field, is_blank
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
 from tankcal.job.tables import read_bytes
 from tankcal.linter.totals import NO_UNITS, Units
+from tankcal.linter.units import FOOT3_M3, IMPERIAL_GALLON_M3, US_GALLON_M3
 from tankcal.messages import message
 from tankcal.recalibration.former import FormerRoof
 
@@ -22,7 +23,10 @@ VOLUME_UNITS = {
     "hL": 0.1,
     "L": 0.001,
     "bbl": 0.158987294928,
-    "gal": 0.003785411784,
+    "gal": US_GALLON_M3,
+    "US gal": US_GALLON_M3,
+    "imp gal": IMPERIAL_GALLON_M3,
+    "ft3": FOOT3_M3,
 }
 
 FORMER = (

@@ -1,0 +1,315 @@
+"""The headings of a grid and the rows under them: which columns are heights, which volumes.
+
+A heading may have a row of units over or below it, a title over it, heights in several columns, or
+steps of the height as columns (`tankcal.linter.wide`).
+"""
+
+from dataclasses import dataclass, field, replace
+from itertools import zip_longest
+
+from tankcal.errors import InputError, Problem
+from tankcal.linter.headings import (
+    Uncertainty,
+    announces_parts,
+    heading_of,
+    is_coverage_factor,
+    is_unit,
+    uncertainty_of,
+)
+from tankcal.linter.numbers import has_digit, has_letter, is_blank
+from tankcal.linter.split_heights import parts_heading, with_joined_heights
+from tankcal.linter.units import INCH_M, Unit, countries_in
+from tankcal.linter.wide import WideHeading, refused_columns, title_unit, wide_heading
+from tankcal.messages import message
+
+_LINES_OF_HEADING = 3  # over the steps of a wide table
+_LONGEST_UNIT = 24  # letters of a cell in a row of units
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Positions and headings of a column of heights and a column of volumes.
+
+    beside  {"uncertainty" or "k": position} of what stands beside them
+    uncertainty  what that heading says, or None
+    parts        ((position, heading), ...) of the other columns of heights before the volumes
+    """
+
+    height: int
+    volume: int
+    height_heading: object
+    volume_heading: object
+    beside: dict = field(default_factory=dict)
+    uncertainty: Uncertainty | None = None
+    parts: tuple = ()
+
+
+@dataclass(frozen=True)
+class Block:
+    """The rows under one heading: pairs of each kind of volume, left to right.
+
+    heading     (row number, cells) of the heading; None without one
+    wide        `WideHeading` of a table whose columns are steps of the height
+    complaints  Problems of its columns
+    """
+
+    pairs: tuple[Pair, ...]
+    width: int
+    rows: tuple
+    is_parts: bool = False
+    heading: tuple | None = None
+    wide: WideHeading | None = None
+    complaints: tuple[Problem, ...] = ()
+
+    @property
+    def has_heading(self):
+        return self.heading is not None
+
+    @property
+    def kind(self):
+        """Blocks of the same kind are pages of one table."""
+        pairs = tuple((p.height_heading, p.volume_heading) for p in self.pairs)
+        return pairs, None if self.wide is None else self.wide.texts
+
+
+def blocks_of(grid):
+    """Tuple of `Block` of a grid; a text without headings is one block of columns 1 and 2."""
+    rows = list(grid.rows)
+    found, start, is_parts, end = [], None, False, 0
+    first_pages = {}
+    index = 0
+    while index < len(rows):
+        cells = rows[index][1]
+        above = [cells for _, cells in rows[max(end, index - _LINES_OF_HEADING) : index]]
+        above = [line for line in above if any(map(has_letter, line))]
+        wide = wide_heading(rows, index, above)
+        if wide is None and not any(has_letter(cell) for cell in cells):
+            index, end = index + 1, index + 1
+            continue
+        if any(announces_parts(cell) for cell in cells):
+            is_parts, start = True, index
+        if wide is not None:
+            first = index + 1
+            pairs = (Pair(0, wide.first, wide.height, wide.volume),)
+            heading = (rows[index][0], cells)
+        else:
+            joined, used = _with_units(rows, index)
+            pairs, first = _pairs(joined), index + used
+            pairs = () if _is_over_wide(rows, index, above) else pairs
+            pairs = tuple(_with_title(pair, above) for pair in pairs)
+            heading = (rows[index][0], joined)
+        if not pairs:
+            index += 1
+            continue
+        pairs = _as_first_page(pairs, wide, first_pages)
+        found.append((first, pairs, heading, is_parts, index if start is None else start, wide))
+        is_parts, start, index, end = False, None, first, first
+    if not found:
+        return _without_heading(grid.name, rows) if grid.is_text else ()
+    ends = [heading_start for *_, heading_start, _ in found[1:]] + [len(rows)]
+    return tuple(
+        _block(grid, pairs, tuple(rows[first:end]), parts, heading, wide)
+        for (first, pairs, heading, parts, _, wide), end in zip(found, ends, strict=True)
+    )
+
+
+def _block(grid, pairs, rows, is_parts, heading, wide):
+    """A `Block`; heights in several columns are joined, unnamed columns of numbers refused."""
+    width = len(trimmed(heading[1]))
+    if wide is not None:
+        return Block(pairs, width, rows, is_parts, heading, wide)
+    problems = []
+    for places in dict.fromkeys((pair.height, pair.parts) for pair in pairs):
+        first = next(pair for pair in pairs if pair.height == places[0])
+        columns = ((first.height, first.height_heading), *first.parts)
+        rows, problem = with_joined_heights(grid.name, rows, *zip(*columns, strict=True))
+        problems += [] if problem is None else [problem]
+    if not is_parts:
+        body = [row for row in rows if any(has_digit(cell) for cell in row[1])]
+        problem = refused_columns(grid.name, body, pairs, *heading)
+        problems += [] if problem is None else [problem]
+    return Block(pairs, width, rows, is_parts, heading, None, tuple(problems))
+
+
+def _as_first_page(pairs, wide, first_pages):
+    """The pairs, with the units that a title over the first page alone names.
+
+    first_pages  {texts of a heading: its pairs}, added to
+    """
+    heights = tuple(pair.height_heading.text for pair in pairs)
+    volumes = wide.texts if wide else tuple(pair.volume_heading.text for pair in pairs)
+    before = first_pages.setdefault((heights, volumes), pairs)
+    return tuple(
+        pair
+        if pair.volume_heading.unit is not None or pair.volume_heading.named.complaint
+        else replace(pair, volume_heading=first.volume_heading)
+        for pair, first in zip(pairs, before, strict=True)
+    )
+
+
+def _is_over_wide(rows, index, above):
+    """Whether the steps of a wide table follow within the lines of one heading."""
+    for below in range(index + 1, min(index + _LINES_OF_HEADING, len(rows))):
+        lines = [*above, *(cells for _, cells in rows[index:below])]
+        if wide_heading(rows, below, lines) is not None:
+            return True
+        if not any(has_letter(cell) for cell in rows[below][1]):
+            return False
+    return False
+
+
+def _with_title(pair, above):
+    """A pair whose unit of volumes a title over the heading names where the heading does not."""
+    named = pair.volume_heading.named
+    if named.choices:
+        texts = [cell for line in above for cell in line if isinstance(cell, str)]
+        sizes = {found[0] for text in texts if len(found := countries_in(text)) == 1}
+        if len(sizes) == 1:
+            named = Unit(named.factor * sizes.pop(), named.factor, named.is_multiplied)
+    elif not named.is_named:
+        named = title_unit(above)
+    return replace(pair, volume_heading=replace(pair.volume_heading, named=named))
+
+
+def _with_units(rows, index):
+    """(heading cells, rows used): a row of units over or below a heading belongs to it."""
+    cells = rows[index][1]
+    if index + 1 >= len(rows):
+        return cells, 1
+    below = rows[index + 1][1]
+    if _is_row_of_units(below) and any(heading_of(cell).role for cell in cells):
+        return _joined(cells, below), 2
+    has_names = any(heading_of(cell).role for cell in below) and not _is_row_of_units(below)
+    has_units = any(heading_of(cell).named.is_named for cell in below)
+    if _is_row_of_units(cells) and has_names and not has_units:
+        return _joined(below, cells), 2
+    return cells, 1
+
+
+def _is_row_of_units(cells):
+    """Whether most cells of a row are units, usable or not, and the others short texts."""
+    named = [cell for cell in cells if not is_blank(cell)]
+    are_texts = all(isinstance(cell, str) and len(cell) <= _LONGEST_UNIT for cell in named)
+    if not named or not are_texts or not any(is_unit(cell) for cell in named):
+        return False
+    others = [cell for cell in named if not is_unit(cell)]
+    return all(has_letter(cell) and not heading_of(cell).role for cell in others)
+
+
+def _joined(names, units):
+    """Cells of names and of units as cells of one heading."""
+    joined = []
+    for name, unit in zip_longest(names, units):
+        parts = [str(part).strip() for part in (name, unit) if not is_blank(part)]
+        is_odd = len(parts) == 2 and not is_unit(parts[1])
+        joined.append(" ".join(parts[:1] + [f"({parts[1]})"] if is_odd else parts) or None)
+    return joined
+
+
+def _pairs(cells):
+    """Pairs of a heading: each run of heights, then volumes, gives the first height to each.
+
+    A column whose unit cannot be used gives way to another column of its run.
+    """
+    headings = [heading_of(cell) for cell in cells]
+    pairs, heights, volumes, before = [], [], [], []
+    for position, heading in enumerate(headings):
+        if not heading.role and heights and not volumes and heights[-1][1].unit == INCH_M:
+            heading = parts_heading(cells[position]) or heading
+        if heading.role in ("height", "ullage"):
+            if volumes:
+                pairs += _pairs_of_run(heights, volumes)
+                heights, volumes = [], []
+            heights.append((position, heading))
+        elif heading.role == "volume":
+            (volumes if heights else before).append((position, heading))
+    pairs += _pairs_of_run(heights, volumes)
+    if not pairs and heights:  # volumes left of their heights
+        pairs = _pairs_of_run(heights, before)
+    return tuple(_with_uncertainty(pairs, cells))
+
+
+def _pairs_of_run(heights, volumes):
+    if not volumes:
+        return []
+    dips = [one for one in heights if one[1].role == "height"] or heights
+    dips = [one for one in dips if not one[1].named.complaint] or dips
+    volumes = [one for one in volumes if not one[1].named.complaint] or volumes[:1]
+    (place, heading), *parts = dips
+    return [Pair(place, k, heading, volume, parts=tuple(parts)) for k, volume in volumes]
+
+
+def _with_uncertainty(pairs, cells):
+    """Pairs with the columns of uncertainties and coverage factors that follow their volumes."""
+    starts = [min(pair.height, pair.volume) for pair in pairs if pair.height] + [len(cells)]
+    for pair in pairs:
+        end = min(start for start in starts if start > pair.volume)
+        end = min([end, *(other.volume for other in pairs if other.volume > pair.volume)])
+        said = {n: uncertainty_of(cells[n]) for n in range(pair.volume + 1, end)}
+        known = sorted((n for n in said if said[n]), key=lambda n: not said[n].is_expanded)
+        if not known:
+            yield pair
+            continue
+        beside = {"uncertainty": known[0]}
+        factors = [n for n in said if said[n] is None and is_coverage_factor(cells[n])]
+        if factors:
+            beside["k"] = factors[0]
+        yield replace(pair, beside=beside, uncertainty=said[known[0]])
+
+
+def trimmed(cells):
+    cells = list(cells)
+    while cells and is_blank(cells[-1]):
+        cells.pop()
+    return cells
+
+
+def _column(number):
+    return message("lint_column", "column {number}", number=str(number))
+
+
+def _without_heading(name, rows):
+    body = [row for row in rows if all(has_digit(cell) for cell in row[1][:2]) and row[1][1:]]
+    if not body or len(body) < 0.5 * len(rows):
+        return ()
+    _refuse_half_a_heading(name, rows)
+    counts = [sum(has_digit(cell) for cell in cells) for _, cells in body]
+    if sum(count > 2 for count in counts) > 0.5 * len(counts):
+        text = message(
+            "lint_columns_no_heading",
+            "no heading, and {count} columns of numbers; expected a heading that names the columns "
+            "of heights and of volumes",
+            count=max(counts),
+        )
+        raise InputError(Problem(name, text, body[0][0]))
+    nothing = heading_of(None)
+    pair = Pair(0, 1, *(replace(nothing, text=_column(k)) for k in (1, 2)))
+    width = max(len(trimmed(cells)) for _, cells in body)
+    return (Block((pair,), width, tuple(body)),)
+
+
+def _refuse_half_a_heading(name, rows):
+    """Raise InputError for a heading that names heights without volumes, or the reverse."""
+    for row, cells in rows:
+        texts = [cell for cell in cells if has_letter(cell)]
+        headings = [heading_of(cell) for cell in texts]
+        roles = {heading.role for heading in headings} - {""}
+        if len(texts) < 2 or not roles:
+            continue
+        refused = next((one for one in headings if one.named.complaint), None)
+        if refused is not None:
+            raise InputError(Problem(name, refused.named.complaint, row, refused.text))
+        text = message(
+            "lint_half_heading",
+            "a heading without a column of volumes ({headings}); expected heights and volumes, "
+            "with headings such as height_m, volume_m3",
+            headings=[heading.text for heading in headings],
+        )
+        if roles == {"volume"}:
+            text = message(
+                "lint_heading_no_heights",
+                "a heading without a column of heights ({headings}); expected heights and volumes, "
+                "with headings such as height_m, volume_m3",
+                headings=[heading.text for heading in headings],
+            )
+        raise InputError(Problem(name, text, row))

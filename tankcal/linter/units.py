@@ -1,0 +1,468 @@
+"""Units in headings: their names in three languages, the factors before them, unusable units.
+
+A heading without a unit leaves the unit open. A heading with a unit that is no height or volume
+(kg, %, V), or that is not known, must not: `unit_of` then has a complaint in place of a size.
+
+Exact sizes: 1 in = 0.0254 m, 1 US gallon = 231 in3, 1 barrel = 42 US gallons, 1 imperial gallon =
+4.54609 L.
+"""
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from math import log10, prod
+
+from tankcal.messages import Message, message
+from tankcal.tank.dips import INCHES_PER_FOOT, METRES_PER_INCH, VOLUME_UNITS_M3
+
+INCH_M = float(METRES_PER_INCH)
+FOOT_M = float(INCHES_PER_FOOT * METRES_PER_INCH)
+FOOT3_M3 = float((INCHES_PER_FOOT * METRES_PER_INCH) ** 3)
+LENGTH, VOLUME = "length", "volume"
+US_GALLON_M3 = float(231 * METRES_PER_INCH**3)
+IMPERIAL_GALLON_M3 = 4.54609e-3
+GALLONS_M3 = (US_GALLON_M3, IMPERIAL_GALLON_M3)  # of a heading that names no country
+_BARREL_M3 = float(VOLUME_UNITS_M3["bbl"])
+
+_SIZES = {
+    LENGTH: (
+        (r"m|ms|mts|mtrs?|met(?:re|er|ro)s?", 1.0),
+        (r"dm|decimet(?:re|er|ro)s?", 0.1),
+        (r"cms?|centimet(?:re|er|ro)s?", 0.01),
+        (r"mms?|mill?imet(?:re|er|ro)s?", 0.001),
+        (r"ins?|inch(?:es)?|pol|polegadas?|pulg?|plg|pulgadas?", INCH_M),
+        (r"ft|foot|feet|pes?|pies?", FOOT_M),
+    ),
+    VOLUME: (
+        (r"m3|kl|[kq]uilolit(?:re|er|ro)s?|kilolit(?:re|er|ro)s?", 1.0),
+        (r"hl|hectolit(?:re|er|ro)s?", 0.1),
+        (r"dal|de[ck]alit(?:re|er|ro)s?", 0.01),
+        (r"l|lit|lts?|ltrs?|lit(?:re|er|ro)s?|dm3", 0.001),
+        (r"dl|decilit(?:re|er|ro)s?", 1e-4),
+        (r"cl|centilit(?:re|er|ro)s?", 1e-5),
+        (r"ml|mill?ilit(?:re|er|ro)s?|cm3", 1e-6),
+        (r"mm3", 1e-9),
+        (r"megalit(?:re|er|ro)s?", 1000.0),
+        (r"bbls?|bls|brls?|barrels?|barril|barris|barriles", _BARREL_M3),
+        (r"kbbls?|kilobarrels?", 1000 * _BARREL_M3),
+        (r"ft3", FOOT3_M3),
+        (r"in3", float(METRES_PER_INCH**3)),
+        (r"yd3", 27 * FOOT3_M3),
+    ),
+}
+_GALLON = re.compile("gals?|gallons?|galao|galoes|galon|galones")
+_BARREL = re.compile("k?bbls?|bls|brls?|barrels?|barril|barris|barriles")
+_US = re.compile("us|american|americanos?|americanas?|estadounidenses?")
+_IMPERIAL = re.compile("uk|imp|imperial|imperiais|imperiales|british|britanicos?|ingles|ingleses|"
+                       "english|canadian|canadenses?|canadienses?")  # fmt: skip
+_DRY = re.compile("dry|secos?")
+_FOREIGN = (
+    (
+        re.compile(
+            "kgs?|kgf|g|grams?|gramos?|gramas?|mg|t|tons?|tonnes?|toneladas?|tm|mt|kt|lbs?|lbm|"
+            "pounds?|libras?|oz|ounces?|cwt|[kq]uilos?|(?:k|qu)ilogram[ao]?s?|kilogrammes?"
+        ),
+        message("lint_kind_mass", "a mass"),
+    ),
+    (
+        re.compile("%|‰|percent|pct|perc|porcent|porcentage[mn]s?|porcentajes?|percentage|"
+                   "percentual|porciento|ppm"),
+        message("lint_kind_percent", "a percentage"),
+    ),
+    (re.compile("v|mv|kv|ma|volts?|voltios?|amps?|hz|khz|ohms?|counts?|digits?|pulses?|pulsos?"),
+     message("lint_kind_signal", "a signal")),
+    (re.compile("bar|mbar|k?pa|mpa|hpa|psig?|psia|mmhg|mca|mwc|mmh|inh|atm|kgfcm"),
+     message("lint_kind_pressure", "a pressure")),
+    (re.compile("°c|°f|°|degc|degf|celsius|fahrenheit|kelvin"),
+     message("lint_kind_temperature", "a temperature")),
+    (
+        re.compile(
+            "m2|cm2|mm2|ft2|in2|sqft|sqm|km|km3|yds?|yards?|jardas?|yardas?|nm|um|micra|microns?|"
+            "thou|mils?|qts?|quarts?|cuartos?|pts?|pints?|pintas?|floz|mmbbls?|mbbls?|mcf|"
+            "mmcf|scf|mscf|mgals?|kgals?|gl|gls|glns?|min|hrs?|hours?|horas?|days?|dias?|"
+            "acft|hhds?|firkins?|casks?|cubits?|rods?|chains?|fathoms?|fms?|bushels?|pipas?"
+        ),
+        message("lint_kind_unknown", "not a unit that is read"),
+    ),
+)  # fmt: skip
+_UNKNOWN = _FOREIGN[-1][1]
+_UNCLEAR = message("lint_kind_unclear", "a name with several meanings")
+_BY_POSITION = re.compile("v|t|g|counts?|digits?|min|mils?|libras?|oz|dias?|horas?|hours?|days?")
+_LARGE_PREFIX = re.compile(r"(?<![A-Za-z])(M{1,2}(?:bbls?|BBLS?|CFs?|cf|SCF|scf|gals?|GALS?)|"
+                           r"Mm[3³]|MM[3³]|M[Ll]|GL|Gl)(?![A-Za-z])")  # fmt: skip
+
+# words of headings in brackets, or behind a comma, that name no unit
+_ORDINARY = re.compile(
+    "net|gross|total|tot|liq|liquid|liquido|liquida|bruto|bruta|neto|neta|util|agua|water|product|"
+    "produto|producto|oil|gas|glp|lpg|oleo|aceite|tank|tk|tq|tanque|shell|bottom|top|fundo|fondo|"
+    "topo|innage|outage|ullage|dip|dips|level|nivel|height|altura|volume|volumen|vol|capacity|"
+    "capacidade|capacidad|cap|observed|obs|corrected|cor|corr|nominal|ref|reference|referencia|"
+    "datum|plate|strike|indicated|real|atual|actual|new|old|novo|nuevo|std|standard|max|min|safe|"
+    "tov|gov|gsv|nsv|approx|aprox|main|inner|outer|interno|externo|inside|outside|cumulative|"
+    "acumulado|acumulada|incl|excl|roof|teto|techo|no|nr|num|col|coluna|columna|column|[a-fhijknopq"
+    "rsuwyz]|[ivx]+|product[os]?|vertical|horizontal|manual|auto|dry|wet|hot|cold|north|south|"
+    "east|west|norte|sul|sur|leste|este|oeste|the|and|of|de|do|da|del|em|en|in|to|at|e|y|a|o|"
+    "medida|medido|lida|lido|leida|leido|read|interpolated|table|tabela|tabla|content|contents"
+)
+_BETWEEN = frozenset(
+    ("of", "de", "da", "do", "del", "a", "an", "the", "um", "uma", "un", "una", "em", "en", "in")
+)
+_TIMES = frozenset(("x", "×", "*", "·"))
+_OPENS, _CLOSES = frozenset("([{"), frozenset(")]}")
+_BREAKS = frozenset((",", ";", ":", "/", "-", "=", *_OPENS))
+_INTRODUCES = frozenset(("in", "em", "en"))
+_PARTS_OF_INCH = (2, 4, 8, 16, 32, 64)
+_PLAIN_FACTORS = frozenset((2.0, 5.0, 20.0, 25.0, 50.0, *(1 / n for n in (3, *_PARTS_OF_INCH))))
+_LEAST_BARE_FACTOR = 100.0  # (10) may be the number of a column
+
+_SUBSTITUTIONS = tuple(
+    (re.compile(pattern, re.ASCII), into)
+    for pattern, into in (
+        (r"_", " , "),
+        (r"\busa?\b|\bu\.s\.?(?:a\.?)?|\beua\b|\be\.u\.a\.?|\bee\.? ?uu\.?", " us "),
+        (r"\bu\.k\.?", " uk "),
+        (r"″|”|\"|''|′′|’’", " in "),
+        (r"(?<![a-z])['′’]", " ft "),
+        (r"(?<=[a-z])\.", " "),
+        (r"\s+", " "),
+        (r"\bfl ?oz\b", "floz"),
+        (r"\bpor ?cento\b|\bpor ?ciento\b|\bper ?cent\b", "percent"),
+        (r"\b(?:at|@|to|a)? ?\d+(?:[.,]\d+)? ?(?:°|o|deg)? ?[cfk]\b", " "),  # 15 degrees Celsius
+        (r"\d[\d.,]* ?(?:kg|g|t|lb)s? ?/ ?(?:m|l|dm|cm|gal|ft|bbl) ?3?\b", " "),  # 700 kg/m3
+        (r"\b(?:at|@|a) ?\d[\d.,]* ?(?:m?bar|[kmh]?pa|psi|atm)g?\b", " "),
+        (r"\b(m|dm|cm|mm|ft|in|yd|pol|pulg|feet|foot) ?(?:\^|\*\*) ?([23])\b", r"\1\2"),
+        (r"\b(?:cubic|cu|cub)[ -]?(?:feet|foot|ft)\b|\b(?:feet|foot|ft)[ -]?(?:cubed|3)\b|"
+         r"\b(?:cuft|cft|cf|fcu)\b|\bp(?:es?|ies?) ?(?:cubicos?|cub|3)\b", " ft3 "),
+        (r"\b(?:cubic|cu|cub)[ -]?(?:inch(?:es)?|in)\b|\b(?:inch(?:es)?|in|pol|pulg|plg)3\b|"
+         r"\bcuin\b|\b(?:pol|polegadas?|pulg|pulgadas?) ?(?:cubicas?|cub|3)\b", " in3 "),
+        (r"\b(?:cubic|cu|cub)[ -]?(?:yards?|yds?)\b|\byds?3\b|\b[jy]ardas? ?(?:cubicas?|3)\b",
+         " yd3 "),
+        (r"\b(?:cubic|cu|cub)[ -]?decimet(?:re|er)s?\b|\bdecimetros? cubicos?\b", " dm3 "),
+        (r"\b(?:cubic|cu|cub)[ -]?centimet(?:re|er)s?\b|\bcentimetros? cubicos?\b|\bccm?\b",
+         " cm3 "),
+        (r"\b(?:cubic|cu|cub)[ -]?mill?imet(?:re|er)s?\b|\bmill?imetros? cubicos?\b", " mm3 "),
+        (r"\b(?:cubic|cu|cub)[ -]?(?:met(?:re|er)s?|m)\b|\b(?:m|mts?|mtrs?|metros?) ?"
+         r"(?:cubicos?|cub|3)\b|\bcbm\b", " m3 "),
+        (r"\bus ?-?(g|gals?)\b", " us gal "),
+        (r"\b(?:uk|imp|i) ?-?gals?\b|\bgpi\b", " imp gal "),
+        (r"\b(?:thousands?|mil|mill?ares|milhares|miles)\b", " 1000 "),
+        (r"\b(?:hundreds?|cem|cien|centenas|centenares)\b", " 100 "),
+        (r"\b(?:millions?|milhoes|millones)\b", " 1000000 "),
+        (r"\b(?:1/)?(8|16|32|64)[ -]?(?:ths?|nds?|avos?)\b", r" 1/\1 "),
+        (r"\b(?:eighths?|oitavos?|octavos?)\b", " 1/8 "),
+        (r"\b(?:sixteenths?|dezesseis ?avos?|dieciseis ?avos?)\b", " 1/16 "),
+        (r"\b(?:quarters?)\b", " 1/4 "),
+        (r"\b(?:tenths?|decimos?|decimas?)\b", " 1/10 "),
+        (r"\b(?:hundredths?|centesimos?|centesimas?)\b", " 1/100 "),
+        (r"\b(?:thousandths?|milesimos?|milesimas?)\b", " 1/1000 "),
+    )
+)  # fmt: skip
+_TOKEN = re.compile(
+    r"\d+/\d+|\d+(?:[.,]\d+)*(?:\^\d+)?|°?[a-z]+[23]?|[%‰°]|[()\[\]{},;:/×*·=-]", re.ASCII
+)
+_POWERS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The unit that a heading names.
+
+    Attributes
+    ----------
+    size : float or None
+        In m or m3, with its factor; None where no unit is named, or none that can be used.
+    factor : float
+        Number before the unit (10 in "10 L"); 1 without one.
+    is_multiplied : bool
+        Whether the factor has a multiplication sign ("x 10 L"), and so is no rounding.
+    choices : tuple of float
+        Sizes of a name with several meanings, in m3.
+    complaint : Message or str
+        Why the unit that is written cannot be used; empty if it can.
+    """
+
+    size: float | None = None
+    factor: float = 1.0
+    is_multiplied: bool = False
+    choices: tuple[float, ...] = ()
+    complaint: Message | str = ""
+
+    @property
+    def is_named(self):
+        """Whether the heading names a unit, usable or not."""
+        return self.size is not None or bool(self.choices or self.complaint)
+
+
+NO_UNIT = Unit()
+
+
+def plain_text(text):
+    """Lower case, without accents, superscripts as digits, ½ as 1/2."""
+    text = re.sub("10([⁰¹²³⁴⁵⁶⁷⁸⁹]+)", lambda power: "10^" + power[1].translate(_POWERS), text)
+    text = re.sub("([¼-¾⅐-⅞])", r" \1", text)
+    decomposed = unicodedata.normalize("NFKD", text).replace("\u2044", "/")
+    return "".join(char for char in decomposed if not unicodedata.combining(char)).lower()
+
+
+def tokens_of(text):
+    """Words, numbers, units and marks of a heading, units by one name each."""
+    plain = plain_text(text)
+    for pattern, into in _SUBSTITUTIONS:
+        plain = pattern.sub(into, plain)
+    return _TOKEN.findall(plain)
+
+
+def size_of(token, dimension):
+    """Size of the unit that a token names, in m or m3; None for any other token."""
+    for pattern, size in _PATTERNS[dimension]:
+        if pattern.fullmatch(token):
+            return size
+    return US_GALLON_M3 if dimension == VOLUME and _GALLON.fullmatch(token) else None
+
+
+_PATTERNS = {
+    dimension: tuple((re.compile(pattern), size) for pattern, size in sizes)
+    for dimension, sizes in _SIZES.items()
+}
+
+
+def unit_of(text, dimension):
+    """The `Unit` of a heading whose column has heights (LENGTH) or volumes (VOLUME)."""
+    tokens = without_prepositions(tokens_of(text))
+    large = _LARGE_PREFIX.search(text) if dimension == VOLUME else None
+    if large is not None:
+        return Unit(complaint=_unusable(large[0], _UNCLEAR, dimension))
+    places = [k for k, token in enumerate(tokens) if size_of(token, dimension) is not None]
+    if not places:
+        return _unit_without_size(tokens, dimension, text)
+    ratio = _foreign_ratio(tokens, places)
+    if ratio:
+        return Unit(complaint=_unusable(ratio, _UNKNOWN, dimension))
+    sizes = [size_of(tokens[k], dimension) for k in places]
+    factor, is_multiplied, unclear = _factor(tokens, places)
+    if unclear:
+        return Unit(complaint=_unclear_factor(unclear))
+    is_feet_and_inches = dimension == LENGTH and set(sizes) == {FOOT_M, INCH_M}
+    if len({round(log10(size), 6) for size in sizes}) > 1 and not is_feet_and_inches:
+        both = " ".join(tokens[k] for k in places)
+        return Unit(complaint=_unusable(both, message("lint_kind_two", "two units"), dimension))
+    if dimension == VOLUME:
+        choices, complaint = _countries(tokens, [tokens[k] for k in places])
+        if complaint:
+            return Unit(complaint=complaint)
+        if choices:
+            choices = tuple(factor * size for size in choices)
+            size = choices[0] if len(choices) == 1 else None
+            return Unit(size, factor, is_multiplied, choices if size is None else ())
+    return Unit(factor * sizes[-1], factor, is_multiplied)
+
+
+def names_only_units(text):
+    """Whether a cell has units, usable or not, with factors and marks, and no other word."""
+    tokens = tokens_of(text)
+    words = [token for token in tokens if token[0].isalpha() or token in ("%", "‰", "°")]
+    is_unit = [
+        any(size_of(word, one) is not None for one in (LENGTH, VOLUME))
+        or _kind(word) is not None
+        or word in _TIMES
+        or any(one.fullmatch(word) for one in (_US, _IMPERIAL, _DRY))
+        for word in words
+    ]
+    return all(is_unit) and any(word not in _TIMES for word in words)
+
+
+def countries_in(text):
+    """Sizes of the gallons that a text gives a country for, in m3."""
+    tokens = tokens_of(text)
+    gallons = [token for token in tokens if _GALLON.fullmatch(token)]
+    return _countries(tokens, gallons)[0] if gallons else ()
+
+
+def without_prepositions(tokens):
+    """The tokens without an "in" that is no inch: before a word, a unit or a number."""
+    kept = []
+    for k, token in enumerate(tokens):
+        after = tokens[k + 1] if k + 1 < len(tokens) else ")"
+        is_fraction = "/" in after and after[0].isdigit()
+        is_last_word = not (after[0].isalnum() or after[0] in "%‰°")
+        if is_fraction:
+            is_last_word = k + 2 == len(tokens) or tokens[k + 2] in _CLOSES | {","}
+        has_number = k > 0 and tokens[k - 1][0].isdigit()
+        if token == "in" and not (is_last_word or has_number or after in _TIMES):
+            kept.append("em")  # a preposition, of another language
+            continue
+        kept.append(token)
+    return kept
+
+
+def _kind(token):
+    """The kind of a unit that is neither height nor volume; None for any other token."""
+    return next((kind for pattern, kind in _FOREIGN if pattern.fullmatch(token)), None)
+
+
+def _unit_without_size(tokens, dimension, text):
+    """The `Unit` of a heading without a usable unit: a complaint where it names another."""
+
+    def unusable(token, kind):
+        written = re.search(re.escape(token), text, re.IGNORECASE)
+        return Unit(complaint=_unusable(written[0] if written else token, kind, dimension))
+
+    for k, token in enumerate(tokens):
+        kind = _kind(token)
+        if kind is not None and (not _BY_POSITION.fullmatch(token) or _is_placed(tokens, k)):
+            return unusable(token, kind)
+    for k, token in enumerate(tokens):
+        is_word = token.rstrip("23").isalpha() and not _ORDINARY.fullmatch(token)
+        is_length = size_of(token, LENGTH) is not None
+        if is_length and dimension == VOLUME and _is_placed(tokens, k):
+            return unusable(token, message("lint_kind_length", "a length"))
+        is_volume = size_of(token, VOLUME) is not None
+        if is_volume and dimension == LENGTH and _is_placed(tokens, k):
+            return unusable(token, message("lint_kind_volume", "a volume"))
+        if is_word and token not in _TIMES and _is_alone(tokens, k):
+            return unusable(token, _UNKNOWN)
+    for k, token in enumerate(tokens):
+        value = number_of(token)
+        before, after = _around(tokens, k)
+        is_bare = before in _OPENS and after in _CLOSES and value and value >= _LEAST_BARE_FACTOR
+        is_power = is_bare and float(log10(value)).is_integer()
+        if value and (before in _TIMES or is_power):
+            return Unit(complaint=_unclear_factor(token))
+    return NO_UNIT
+
+
+def _around(tokens, k):
+    """The tokens before and behind a token; "(" and ")" at the ends."""
+    return tokens[k - 1] if k else "(", tokens[k + 1] if k + 1 < len(tokens) else ")"
+
+
+def _is_placed(tokens, k):
+    """Whether a token has the place of a unit: in brackets, last, or behind a comma or "in"."""
+    before, after = _around(tokens, k)
+    is_last = k + 1 == len(tokens) and (k > 0 or len(tokens) == 1)
+    is_symbol = tokens[k] == "v" and before not in _BREAKS | _INTRODUCES  # volume V
+    return not is_symbol and (
+        is_last or before in _BREAKS - {"-"} or before in _INTRODUCES or after in _CLOSES
+    )
+
+
+def _is_alone(tokens, k):
+    """Whether a word is the only one in brackets, or behind a comma, a slash or "in"."""
+    before, after = _around(tokens, k)
+    is_end = k + 1 == len(tokens) or after in _CLOSES or after in (",", ";")
+    return k > 0 and is_end and (before in _BREAKS - {"-"} or before in _INTRODUCES)
+
+
+def _foreign_ratio(tokens, places):
+    """A unit over another kind of unit, such as kg/L, as text; "" where there is none."""
+    for k in places:
+        for other, slash in ((k - 2, k - 1), (k + 2, k + 1)):
+            if 0 <= other < len(tokens) and 0 <= slash < len(tokens) and tokens[slash] == "/":
+                kind = _kind(tokens[other])
+                if kind is not None and not _BY_POSITION.fullmatch(tokens[other]):
+                    return "".join(tokens[min(k, other) : max(k, other) + 1])
+    return ""
+
+
+def number_of(token):
+    """Value of a number or a fraction as typed; None for any other token."""
+    if not token[0].isdigit():
+        return None
+    if "/" in token:
+        over, under = token.split("/")
+        return int(over) / int(under) if int(under) else None
+    base, _, power = token.partition("^")
+    grouped = re.fullmatch(r"[1-9]\d{0,2}(?:[.,]000)+", base)
+    base = re.sub("[.,]", "", base) if grouped else base.replace(",", ".")
+    if base.count(".") > 1 or len(base) > 12 or len(power) > 1:
+        return None
+    return float(base) ** int(power or 1)
+
+
+def _factor(tokens, places):
+    """(factor, whether it has a sign of multiplication, unclear number as text or "")."""
+    found, is_multiplied = {}, False
+    for k, token in enumerate(tokens):
+        value = number_of(token)
+        if value is None:
+            continue
+        before, after = _around(tokens, k)
+        ahead = k + 1
+        while ahead < len(tokens) and (
+            tokens[ahead] in _TIMES | _BETWEEN
+            or any(one.fullmatch(tokens[ahead]) for one in (_US, _IMPERIAL))
+        ):
+            ahead += 1
+        signs = {before, *tokens[k + 1 : ahead]} & _TIMES
+        is_before = ahead in places
+        is_behind = k - 1 in places and ("/" in token or before in _TIMES)
+        is_behind |= k - 2 in places and before in _TIMES
+        is_over = before == "/" and k - 2 in places and ahead not in places
+        is_part = "/" in token and any(size_of(tokens[p], LENGTH) == INCH_M for p in places)
+        if not (signs or is_before or is_behind or is_over or is_part):
+            is_bare = before in _OPENS and after in _CLOSES and value >= _LEAST_BARE_FACTOR
+            if is_bare and float(log10(value)).is_integer():
+                return 1.0, False, token
+            continue
+        if is_over:
+            value = 1 / value if value in _PARTS_OF_INCH else 0.0
+        if signs and not is_before and value == 1:
+            continue
+        is_free = k > 0 and not signs and tokens[k - 1][0].isalpha()
+        if is_free and tokens[k - 1] not in _BETWEEN and k - 1 not in places:
+            is_free = not _ROLE_WORD.fullmatch(tokens[k - 1])
+        else:
+            is_free = False
+        if is_free or not _is_usual_factor(value):
+            return 1.0, False, token
+        found[k], is_multiplied = value, is_multiplied or bool(signs)
+    return float(prod(found.values())), is_multiplied, ""
+
+
+_ROLE_WORD = re.compile(
+    "heights?|dips?|innage|levels?|gauge|depth|sounding|altura|nivel|medida|volumen?s?|vols?|"
+    "capacity|capacidade?|quantity|quantidade|cantidad|contents?|conteudo|contenido|ullage|outage"
+)
+
+
+def _is_usual_factor(value):
+    return value > 0 and (value in _PLAIN_FACTORS or abs(log10(value) - round(log10(value))) < 1e-9)
+
+
+def _countries(tokens, names):
+    """(sizes of gallons, complaint) by the country that the tokens name."""
+    is_us, is_imperial, is_dry = (
+        any(one.fullmatch(token) for token in tokens) for one in (_US, _IMPERIAL, _DRY)
+    )
+    gallons = [name for name in names if _GALLON.fullmatch(name)]
+    is_odd = is_imperial and any(_BARREL.fullmatch(name) for name in names)
+    if is_odd or (gallons and (is_dry or (is_us and is_imperial))):
+        return (), _unusable(" ".join(names), _UNCLEAR, VOLUME)
+    if not gallons:
+        return (), ""
+    if is_us or is_imperial:
+        return (US_GALLON_M3 if is_us else IMPERIAL_GALLON_M3,), ""
+    return GALLONS_M3, ""
+
+
+def _unusable(unit, kind, dimension):
+    expected = "m, dm, cm, mm, in, ft"
+    if dimension == VOLUME:
+        expected = "m3, L, hL, bbl, US gal, imp gal, ft3"
+    return message(
+        "lint_unusable_unit",
+        "found the unit {unit}, {meaning}; expected a heading with one of the units {units}: "
+        "convert the column, or correct the heading",
+        unit=unit,
+        meaning=kind,
+        units=expected,
+    )
+
+
+def _unclear_factor(number):
+    return message(
+        "lint_unclear_factor",
+        "found the number {number} in the heading, perhaps a factor; expected a factor with its "
+        "unit, such as (x 10 L) or (1/8 in), or no number",
+        number=number,
+    )

@@ -1,0 +1,295 @@
+"""Tables whose columns are steps of the height: rows of centimetres, columns of 0 to 9 mm.
+
+The height of a cell is the height of its row plus the label of its column. The unit of the labels
+comes from the heading; where it names none, from the rows: a row continues where the row below it
+ends, so that the step of the rows is the number of columns times the step of the labels.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from tankcal.errors import Problem
+from tankcal.linter.headings import Heading, heading_of
+from tankcal.linter.numbers import has_digit, has_letter, is_blank, read_number, style_of
+from tankcal.linter.units import (
+    LENGTH,
+    VOLUME,
+    Unit,
+    number_of,
+    size_of,
+    tokens_of,
+    unit_of,
+    without_prepositions,
+)
+from tankcal.messages import message
+
+_FEWEST, _FEWEST_WITH_UNITS = 4, 2  # labels of columns
+_MOST_WORDS = 4  # of the heading of a column
+_SAME = 1e-6
+# unit of the labels over the unit of the rows, where no heading names it
+_RATIOS = (1.0, 0.1, 0.01, 0.001, 1 / 12, 1 / 8, 1 / 16)
+
+
+@dataclass(frozen=True)
+class WideHeading:
+    """The heading of a table whose columns are steps of the height.
+
+    first    position of the first column of volumes
+    has_volumes_first  whether the first of them is named as volumes (height, volume, 1, 2 ... 9)
+    labels   heights that the columns add, in `label_m`
+    texts    of the labels
+    row_m    size of the unit of the rows, m; None where no heading names it
+    label_m  size of the unit of the labels, m; None likewise
+    height, volume  `Heading` of the rows and of the volumes
+    """
+
+    first: int
+    has_volumes_first: bool
+    labels: tuple[float, ...]
+    texts: tuple[str, ...]
+    row_m: float | None
+    label_m: float | None
+    height: Heading
+    volume: Heading
+
+
+def wide_heading(rows, index, above):
+    """The `WideHeading` in a row, or None.
+
+    rows   (row number, cells) of a grid
+    above  cells of the rows over it that belong to the heading
+    """
+    cells = rows[index][1]
+    if len(cells) < 3 or (has_digit(cells[0]) and not has_letter(cells[0])):
+        return None
+    has_volume = heading_of(cells[1]).role == "volume"
+    start = 2 if has_volume else 1
+    labels = []
+    for cell in cells[start:]:
+        label = _label(cell)
+        if label is None:
+            break
+        labels.append(label)
+    if has_volume and labels:
+        labels.insert(0, (0.0, labels[0][1]))
+    if not _is_even(labels) or not _has_rows(rows, index, len(labels)):
+        return None
+    units = [unit for _, unit in labels if unit is not None]
+    named = units[-1] if units else None
+    row_m, label_m = _units(cells, above, named)
+    volume = _volume_heading(cells, above)
+    titles = [line[0] for line in (cells, *above[::-1]) if line and _is_short(line[0])]
+    roles = [heading_of(title) for title in titles]
+    role = next((one.role for one in roles if one.role in ("height", "ullage")), "height")
+    text = cells[0].strip() if isinstance(cells[0], str) else ""
+    text = text or next((one.text for one in roles if one.text), "")
+    texts = tuple(str(cell).strip() for cell in cells[1 : 1 + len(labels)])
+    values = tuple(value for value, _ in labels)
+    unit = Unit(row_m) if row_m is not None else Unit()
+    return WideHeading(
+        1, has_volume, values, texts, row_m, label_m, Heading(text, role, unit), volume
+    )
+
+
+def _is_short(cell):
+    """Whether a cell may be the heading of a column; a title over the table has more words."""
+    return isinstance(cell, str) and len(cell.split()) <= _MOST_WORDS
+
+
+def _volume_heading(cells, above):
+    """`Heading` of the volumes: of a cell beside the heights, or of a title (volumes in litres)."""
+    for line in (cells, *above[::-1]):
+        for position, cell in enumerate(line):
+            heading = heading_of(cell)
+            is_title = position == 0 and sum(not is_blank(one) for one in line) == 1
+            if heading.role == "volume" and not is_title:
+                return heading
+    return Heading("", "volume", title_unit(above))
+
+
+def _label(cell):
+    """(number, size of its unit or None) of the label of a column, or None."""
+    if isinstance(cell, int | float) and not isinstance(cell, bool):
+        return float(cell), None
+    if not isinstance(cell, str) or not has_digit(cell):
+        return None
+    tokens = [token for token in tokens_of(cell) if token not in ("(", ")", "=")]
+    if len(tokens) == 2 and tokens[0][0].isalpha():
+        tokens.reverse()
+    value = number_of(tokens[0]) if tokens else None
+    if value is None or len(tokens) > 2:
+        return None
+    if len(tokens) == 1:
+        return value, None
+    size = size_of(tokens[1], LENGTH)
+    return None if size is None else (value, size)
+
+
+def _is_even(labels):
+    """Whether labels rise from 0, or their first step, by even steps."""
+    values = [value for value, _ in labels]
+    has_units = any(unit is not None for _, unit in labels[1:])
+    if len(values) < (_FEWEST_WITH_UNITS if has_units else _FEWEST):
+        return False
+    steps = np.diff(values)
+    return bool(
+        steps.min() > 0
+        and np.ptp(steps) <= _SAME * steps[0]
+        and 0 <= values[0] <= steps[0] * (1 + _SAME)
+    )
+
+
+def _has_rows(rows, index, count):
+    """Whether the next row has a height and volumes below the labels."""
+    if index + 1 >= len(rows):
+        return False
+    cells = rows[index + 1][1]
+    volumes = cells[1 : 1 + count]
+    return (
+        has_digit(cells[0])
+        and not has_letter(cells[0])
+        and sum(has_digit(cell) and not has_letter(cell) for cell in volumes) >= min(2, count)
+    )
+
+
+def _units(cells, above, of_labels):
+    """(unit of the rows, unit of the labels) that the heading names, m; None for what it does not.
+
+    A first cell such as cm / mm names both.
+    """
+    own = []
+    for line in (cells, *above[::-1]):
+        text = line[0] if line and _is_short(line[0]) else ""
+        tokens = without_prepositions(tokens_of(text))
+        own += [size for size in (size_of(token, LENGTH) for token in tokens) if size is not None]
+        if own:
+            break
+    other = [of_labels] if of_labels is not None else own[1:]
+    if not other:
+        texts = [cell for line in above for cell in line[1:] if isinstance(cell, str)]
+        tokens = [token for text in texts for token in without_prepositions(tokens_of(text))]
+        other = [size for size in (size_of(token, LENGTH) for token in tokens) if size is not None]
+    return (own[0] if own else None), (other[0] if other else None)
+
+
+def wide_cells(name, wide, rows, log):
+    """For each label a list of (row, name of height, name of volume, height, volume, {}).
+
+    Heights are numbers in the unit of the rows. Tells `log` where rows and labels do not continue
+    each other; then the lists are empty.
+    """
+    rows = [(row, cells) for row, cells in rows if has_digit(cells[0]) and not has_letter(cells[0])]
+    style = style_of([[cells[0] for _, cells in rows]])
+    bases = [read_number(cells[0], style).value for _, cells in rows]
+    ratio = _ratio(wide, [base for base in bases if base is not None])
+    columns = [[] for _ in wide.labels]
+    if wide.has_volumes_first and _are_parts(wide, rows):
+        text = message(
+            "lint_columns_of_parts",
+            "columns {first} to {last} have parts of a step, not volumes: they are not read",
+            first=wide.texts[1],
+            last=wide.texts[-1],
+        )
+        log.warning(name, text, rows[0][0])
+        wide, ratio = replace(wide, labels=wide.labels[:1]), 1.0
+    if ratio is None:
+        text = message(
+            "lint_wide_layout",
+            "columns {first} to {last} are steps of the height, but they do not fill the steps of "
+            "the rows; expected as many columns as steps fit between two rows, and the units of "
+            "both in the heading, such as cm / mm",
+            first=wide.texts[0],
+            last=wide.texts[-1],
+        )
+        log.problem(name, text, rows[0][0])
+        return columns
+    digits = 12  # of a height: binary fractions of decimal steps do not show
+    for number, ((row, cells), base) in enumerate(zip(rows, bases, strict=True)):
+        volumes = [
+            cells[wide.first + k] if wide.first + k < len(cells) else None
+            for k in range(len(wide.labels))
+        ]
+        filled = [k for k, volume in enumerate(volumes) if not is_blank(volume)]
+        first = filled[0] if filled and number == 0 else 0
+        last = (filled[-1] if filled else -1) if number == len(rows) - 1 else len(volumes) - 1
+        for k in range(first, last + 1):
+            height = cells[0] if base is None else round(base + wide.labels[k] * ratio, digits)
+            column = f"{wide.height.text}, {wide.texts[k]}".strip(", ")
+            columns[k].append((row, wide.height.text, column, height, volumes[k], {}))
+    return columns
+
+
+def _are_parts(wide, rows):
+    """Whether the columns behind the first are smaller than it: parts, to be added to it."""
+    columns = [
+        [cells[wide.first + k] if wide.first + k < len(cells) else None for _, cells in rows]
+        for k in (0, 1)
+    ]
+    style = style_of(columns)
+    pairs = [
+        [read_number(cell, style).value for cell in pair] for pair in zip(*columns, strict=True)
+    ]
+    known = [pair for pair in pairs if None not in pair]
+    return sum(after < first for first, after in known) > 0.5 * len(known)
+
+
+def _ratio(wide, bases):
+    """Unit of the labels over the unit of the rows; None where they do not continue each other."""
+    steps = [abs(b - a) for a, b in pairwise(bases) if b != a]
+    if not steps:
+        return None
+    base_step, label_step = float(np.median(steps)), wide.labels[1] - wide.labels[0]
+    row_by_row = base_step / (len(wide.labels) * label_step)  # columns continue in the next row
+    # rows continue in the next column
+    by_column = (len(bases) * base_step) / label_step
+    if wide.row_m is not None and wide.label_m is not None:
+        ratio = wide.label_m / wide.row_m
+        fits = (abs(ratio / one - 1) <= _SAME for one in (row_by_row, by_column))
+        return ratio if any(fits) else None
+    known = (one for one in _RATIOS if abs(one / row_by_row - 1) <= _SAME)
+    return next(known, None)
+
+
+def refused_columns(name, block_rows, pairs, heading_row, heading_cells):
+    """The Problem of two columns of numbers or more that no heading names; None without them."""
+    taken = {place for pair in pairs for place in (pair.height, pair.volume, *pair.beside.values())}
+    width = max((len(cells) for _, cells in block_rows), default=0)
+    unnamed = []
+    for place in set(range(width)) - taken:
+        title = heading_cells[place] if place < len(heading_cells) else None
+        if has_letter(title):
+            continue
+        filled = sum(
+            place < len(cells) and has_digit(cells[place]) and not has_letter(cells[place])
+            for _, cells in block_rows
+        )
+        if filled > 0.5 * len(block_rows):
+            unnamed.append(place + 1)
+    if len(unnamed) < 2:
+        return None
+    text = message(
+        "lint_unnamed_columns",
+        "{count} columns of numbers (from column {first} on) have no heading of heights or "
+        "volumes; expected a heading for each column, or steps of the height as headings (0 mm, "
+        "1 mm ...)",
+        count=len(unnamed),
+        first=unnamed[0],
+    )
+    return Problem(name, text, heading_row)
+
+
+def title_unit(above):
+    """The `Unit` of volumes that a title over the heading names ("volumes in litres")."""
+    for line in above[::-1]:
+        for cell in line:
+            if not isinstance(cell, str):
+                continue
+            tokens = tokens_of(cell)
+            for k, token in enumerate(tokens[:-1]):
+                if token in ("in", "em", "en") and heading_of(cell).role == "volume":
+                    unit = unit_of(" ".join(tokens[k + 1 :]), VOLUME)
+                    if unit.is_named:
+                        return unit
+    return Unit()
