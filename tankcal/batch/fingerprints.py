@@ -6,7 +6,6 @@ it names. Too much is harmless (the job is done once more), too little would not
 
 import json
 import os
-import tomllib
 import zipfile
 from functools import lru_cache
 from hashlib import sha256
@@ -131,9 +130,11 @@ def _named_in_book(path):
 
 def _named_in_former(path):
     """The table that a former.toml names, where it lies beside it."""
+    from tankcal.recalibration.inputs import rows_file
+
     try:
-        name = tomllib.loads(path.read_text(encoding="utf-8"))["former"]["file"]
-        return [name] if (path.parent / name).is_file() else []
+        table = rows_file(path)
+        return [table.name] if table.is_file() else []
     except (OSError, ValueError, LookupError, TypeError):
         return []
 

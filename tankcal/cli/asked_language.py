@@ -1,10 +1,10 @@
 """The language that a job asks for, found before all else, so that its problems are told in it."""
 
-import json
 from pathlib import Path
 
 from tankcal.job.folder import MAX_SETTINGS_BYTES, parsed_toml
 from tankcal.job.tables import SETTINGS_FILE, SETTINGS_SHEET, Log, read_bytes
+from tankcal.text.decoding import read_json
 from tankcal.text.languages import DEFAULT, LANGUAGES, nearest_language
 from tankcal.text.words import load_words
 
@@ -42,7 +42,7 @@ def asked_of_record(path):
 
     path = Path(path)
     try:
-        record = json.loads((path / RECORD if path.is_dir() else path).read_bytes())
+        record = read_json(path / RECORD if path.is_dir() else path)
         return nearest_language(record["job"]["table"]["language"])
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
         return None

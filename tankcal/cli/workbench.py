@@ -66,7 +66,7 @@ def _port(text):
 def _written(options, out):
     """Path of the notebook of a job, written or kept as it is."""
     from tankcal.cli.asked_language import asked_language
-    from tankcal.workbench.draft import source_of
+    from tankcal.workbench.draft import Draft, source_of
     from tankcal.workbench.notebook_file import notebook_path, write_notebook
 
     language = options.language or asked_language(options.job)
@@ -86,6 +86,8 @@ def _written(options, out):
             file=str(path),
         )
         say(text)
+    for problem in Draft(source).unreadable:
+        complain(problem.text)
     return path
 
 

@@ -19,11 +19,18 @@ class ScanHeader:
     pose : ndarray, shape (4, 4), or None
         From the scan's own frame to the frame of the file, lengths in the unit of the file;
         None: the file has none, so that its coordinates are those of one frame.
+    warning : Message or None
+        Of a pose in the file that is not used.
+    is_placed : bool
+        Whether the file gives a position without a rotation: then the coordinates of several
+        scans are in no common frame.
     """
 
     name: str
     declared: int | None
     pose: np.ndarray | None = None
+    warning: str | None = None
+    is_placed: bool = False
 
 
 @dataclass(frozen=True)

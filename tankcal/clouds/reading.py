@@ -123,7 +123,7 @@ def read_cloud(header, *, piece=WHOLE, unit_m=1.0, chunk=1 << 18, progress=None)
     0 [[6.5005 0.     1.    ]]
     """
     file = _unchanged(header)
-    count = _Count(file, header.scans, piece, progress)
+    count = _Count(file, header, piece, progress)
     check = _Check(file, unit_m, piece)
     parts = iter(read_pieces(file, chunk, piece))
     while (found := _guarded(file, lambda: next(parts, None))) is not None:
@@ -162,10 +162,13 @@ def _guarded(file, task):
 class _Count:
     """Records read of each scan, against what was declared; tells the progress."""
 
-    def __init__(self, file, scans, piece, progress):
+    def __init__(self, file, header, piece, progress):
+        scans = header.scans
         self.file, self.scans, self.progress = file, scans, progress
         self.read = [0] * len(scans)
         self.declared = [scan.declared for scan in scans]
+        if header.format == "xyz" and piece != WHOLE:  # a range of bytes, not of points
+            self.declared = [None]
         self.first = 0
         if piece.scan is not None:
             self.declared = [n if i == piece.scan else 0 for i, n in enumerate(self.declared)]

@@ -5,6 +5,7 @@ import re
 from tankcal.fieldbooks import gsi, jobxml, profile, rw5, sdr
 from tankcal.fieldbooks.cutting import tell_cut_numbers
 from tankcal.messages import message
+from tankcal.text.decoding import decode_text, find_encoding
 
 FORMATS = ("gsi", "rw5", "jxl", "sdr", "csv")
 NAMES = {
@@ -15,8 +16,19 @@ NAMES = {
     "csv": "CSV",
 }
 MAX_BYTES, MAX_LINE, LOOKED_AT = 50_000_000, 4000, 60  # of a file, characters, lines
-_MARKS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 _JOBXML = re.compile(r"<(\w+:)?JOBFile[\s>]")
+# A serial transfer puts controls (STX, ETX, Ctrl-Z, zero bytes) around lines, and controls of its
+# flow (XON, XOFF) anywhere.
+_AROUND_BYTES = bytes((*range(0x09), *range(0x0B, 0x20), 0x7F))
+_AROUND = _AROUND_BYTES.decode("ascii") + "\ufeff"
+_FLOW = str.maketrans(dict.fromkeys("\x11\x13"))
+_FOREIGN = {  # formats that are not read: a regular expression of their lines
+    "Nikon RAW": r"CO,\s*Nikon RAW|(MP|CC|ST|CP|SS|F[12]|UP)(,[^,]*){4,}$",
+    "Trimble DC": r"00NMSC|10NM.*SCV",
+    "Geodimeter": r"\d{1,3}=[^,;\t]*$",
+    "Topcon GTS": r"GTS-\d+ v|(STN|BKB|XYZ|HV|SD)\t",
+    "LandXML": r"<LandXML\b|<\?xml.*<LandXML\b",
+}
 
 
 def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
@@ -31,11 +43,7 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
         return None
     found = wanted or _format_of(text, described)
     if found is None:
-        expected = message(
-            "format_unknown",
-            "not recognised; expected GSI, RW5, JobXML, SDR33, or a plain table with --profile",
-        )
-        log.problem(file, expected)
+        log.problem(file, _refusal(text))
         return None
     if found == "csv" and described is None:
         text = message(
@@ -44,7 +52,8 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
         log.problem(file, text)
         return None
     if found == "jxl":
-        return jobxml.read(data, file, log)
+        is_plain = find_encoding(data) == "utf-8"  # the bytes of letters in UTF-16 can be controls
+        return jobxml.read(data.strip(_AROUND_BYTES + b"\r\n\t ") if is_plain else data, file, log)
     for row, line in enumerate(text.split("\n"), 1):
         if len(line) > MAX_LINE and not (found == "gsi" and gsi.LINE.match(line)):
             expected = message("line_too_long", "a line of more than {most} characters; expected a"
@@ -57,38 +66,70 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
         book = gsi.read(text, file, log, custom)
     else:
         book = {"rw5": rw5, "sdr": sdr}[found].read(text, file, log)
+    if data.endswith(b"\0") and find_encoding(data) == "utf-8":
+        count = len(data) - len(data.rstrip(b"\0"))
+        book.note(message("zeros_at_end", "{count} zero bytes at the end of the file, not read: is"
+                          " its last line complete?", count=count))  # fmt: skip
     tell_cut_numbers(book, log)
     return book
 
 
 def _text(file, data, log):
-    """The text of a file: UTF-8, UTF-16 with its mark, else the letters of western Windows."""
-    encoding = next((name for mark, name in _MARKS if data.startswith(mark)), None)
-    if encoding != "utf-16" and b"\0" in data:
-        row = data[: data.index(b"\0")].count(b"\n") + 1
-        text = message("binary_file", "a zero byte; expected a text file of an instrument")
-        log.problem(file, text, row)
-        return None
-    for name in (encoding,) if encoding else ("utf-8", "cp1252", "latin-1"):
+    """The text of a file: UTF-8, UTF-16, else the letters of western Windows.
+
+    Without the control characters of a serial transfer: they are no part of a line.
+    """
+    encoding = find_encoding(data)
+    for name in ("utf-8", "cp1252", "latin-1") if encoding == "utf-8" else (encoding,):
         try:
-            return data.decode(name).replace("\r\n", "\n").replace("\r", "\n")
+            text = decode_text(data, name)
         except UnicodeDecodeError:
             continue
+        lines = text.replace("\r\n", "\n").replace("\r", "\n").translate(_FLOW).split("\n")
+        lines = [line.strip(_AROUND) for line in lines]
+        row = next((row for row, line in enumerate(lines, 1) if "\0" in line), None)
+        if row is None and (any(lines) or "\0" not in text):
+            return "\n".join(lines)
+        text = message("binary_file", "a zero byte; expected a text file of an instrument")
+        log.problem(file, text, row or 1)
+        return None
     text = message("cut_letters", "letters that cannot be read as {encoding}: is the file whole?",
                    encoding=encoding)  # fmt: skip
     log.problem(file, text)
     return None
 
 
+def _refusal(text):
+    """Refusal of a text of no format that is read; a format that is recognised gets its name."""
+    lines = _first_lines(text)
+    for name, pattern in _FOREIGN.items():
+        count = sum(re.match(pattern, line.strip(), re.IGNORECASE) is not None for line in lines)
+        if count and (2 * count >= len(lines) or name == "LandXML"):
+            return message(
+                "format_foreign",
+                "a file in the format {name}, which is not read; expected GSI, RW5, JobXML or"
+                " SDR33: export the job in one of them, or as a plain table with --profile",
+                name=name,
+            )
+    return message(
+        "format_unknown",
+        "not recognised; expected GSI, RW5, JobXML, SDR33, or a plain table with --profile",
+    )
+
+
 def _format_of(text, described):
-    lines = [line for line in text[: LOOKED_AT * MAX_LINE].split("\n") if line.strip()]
-    lines = lines[:LOOKED_AT]
+    lines = _first_lines(text)
     if lines and lines[0].lstrip().startswith("<"):
         return "jxl" if _JOBXML.search(text[:MAX_BYTES]) else None
-    if lines and sdr.HEADER.match(lines[0].lstrip("\x02")):
+    if lines and sdr.HEADER.match(lines[0]):
         return "sdr"
     for name, pattern in (("gsi", gsi.LINE), ("rw5", rw5.LINE)):
         count = sum(pattern.match(line) is not None for line in lines)
         if count and 2 * count >= len(lines):
             return name
     return "csv" if described is not None else None
+
+
+def _first_lines(text):
+    lines = [line for line in text[: LOOKED_AT * MAX_LINE].split("\n") if line.strip()]
+    return lines[:LOOKED_AT]

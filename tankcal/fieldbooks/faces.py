@@ -128,8 +128,8 @@ def _mean(first, second, mine, log):
         text = message(
             "no_pair_of_faces",
             "point {point!r}: face 2 is {across_deg:+.4f} degrees across and {up_deg:+.4f} degrees"
-            " up from face 1 (row {row}); expected less than {most:g}: two points of one name, or"
-            " angles in another unit?",
+            " up from face 1 (row {row}); expected less than {most:g}: give two points of one name"
+            " different names in the file, or correct the unit of the angles",
             point=first.point,
             across_deg=-2 * (collimation or 0.0),
             up_deg=2 * (index or 0.0),

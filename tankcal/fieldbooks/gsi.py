@@ -40,7 +40,8 @@ LENGTH_WORDS = ("31", "32", "33", *OF_TARGET, *OF_STATION, "87", "88")
 CODES = tuple(f"4{digit}" for digit in range(1, 10))
 KNOWN = (*TEXTS, *CODES, *LENGTH_WORDS, "12", "13", "17", "19", "21", "22", "51", "58", "59")
 SHOWN = 3  # code blocks
-FILLER = re.compile(r"[-?]*")  # what some instruments write for no code
+FILLER = re.compile(r"[-?]*")  # some instruments write these characters for no code or name
+NO_VALUE = re.compile(r"0*[-?*. ]+")  # the digits of a word without a value, mostly -----
 EARLIEST, LATEST = 1980, 2200  # years
 SAME_M = 0.001  # heights of an instrument, coordinates of a station
 UNLIKE_M = 0.003  # between the horizontal distance of the file and that of slope and angle
@@ -67,7 +68,7 @@ def read(text, file, log, custom=UNSAID):
     """FieldBook of the text of a GSI file."""
     book, state = FieldBook(file, "gsi"), _State()
     for row, line in enumerate(text.split("\n"), 1):
-        line = line.lstrip(" \t").rstrip("\r\x1a\t")
+        line = line.lstrip(" \t").rstrip("\t")
         if not line.strip():
             continue
         words = _words(line)
@@ -149,7 +150,7 @@ def _take_code(book, log, row, words, state, custom):
 def _begin_station(book, log, row, name, word, state):
     """A set-up from a code block; its height of the instrument stands in millimetres."""
     height = None
-    if word is not None:
+    if word is not None and _has_value(word):
         digits = word[1][1:]
         if not (digits.isascii() and digits.isdigit()):
             refuse_number(log, book.file, row, word[1])
@@ -184,7 +185,7 @@ def _take(book, log, row, words, state):
         return
     values = {}
     for index in given:
-        if index in ("21", "22") or index in LENGTH_WORDS:
+        if (index in ("21", "22") or index in LENGTH_WORDS) and _has_value(given[index]):
             values[index] = _value(book, log, row, index, *given[index])
             if values[index] is None:
                 return
@@ -192,12 +193,13 @@ def _take(book, log, row, words, state):
     _take_constants(book, given, state)
     if "12" in given or "13" in given:
         named = [_text(given[one]) for one in ("13", "12") if one in given]
-        book.instrument = " ".join(named)
+        book.instrument = " ".join(one for one in named if not FILLER.fullmatch(one))
     name = _text(given["11"]) if "11" in given else ""
+    name = "" if FILLER.fullmatch(name) else name
     is_reading = any(index in values for index in ("21", "22", "31", "32"))
     _take_station(book, row, name, values, is_reading, state)
-    if "87" in values:
-        state.height = values["87"]
+    if "87" in given:  # without a value, the height of the target before does not hold either
+        state.height = values.get("87")
     if is_reading:
         texts = [_text(given[one]) for one in (*TEXTS[1:], *CODES) if one in given]
         code = " ".join(one for one in texts if not FILLER.fullmatch(one))
@@ -229,6 +231,10 @@ def _known_words(book, log, row, words):
 
 def _text(word):
     return plain_name(word[1][1:])
+
+
+def _has_value(word):
+    return NO_VALUE.fullmatch(word[1][1:]) is None
 
 
 def _value(book, log, row, index, unit, text):

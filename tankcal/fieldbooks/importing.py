@@ -336,7 +336,8 @@ def _stations(known, stands, chosen, log):
                 text = message(
                     "imported_known_twice",
                     "point {point!r} has other coordinates than in row {row} of {file}; expected"
-                    " one place of each known point (--no-control leaves coordinates out)",
+                    " one place of each known point: give one of two points another name, delete"
+                    " the coordinates that do not apply, or leave all out with --no-control",
                     point=point[:40],
                     row=str(before[2]),
                     file=before[1],

@@ -22,12 +22,16 @@ from tankcal.fieldbooks.book import (
 from tankcal.messages import message
 
 RECORDS = {"SS", "TR", "BD", "FD", "BR", "FR"}
-LINE = re.compile(r"\s*(--|(JB|MO|OC|BK|LS|SS|TR|BD|FD|BR|FR|SP)\s*,)")
 FACES = {"BD": 1, "FD": 1, "BR": 2, "FR": 2}
 UNITS = {0: "ft", 1: "m", 2: "usft"}
 _CODES = ("OP", "FP", "BP", "PN", "BS", "BC", "HI", "HR", "AR", "AL", "AZ", "DR", "DL", "BR", "ZE",
           "VA", "CE", "SD", "HD", "EL", "NM", "DT", "TM", "UN", "AU", "AD", "SF", "EC", "EO", "FE",
           "TS", "FC", "N", "E")  # fmt: skip
+# Two fields with their codes, because a raw file of Nikon has records SS without codes.
+_FIELD = rf"\s*(?:{'|'.join(_CODES)})"
+LINE = re.compile(
+    rf"\s*(--|(JB|MO|OC|BK|LS|SS|TR|BD|FD|BR|FR|SP)\s*,{_FIELD}[^,]*(,(--|{_FIELD})|$))"
+)
 _HORIZONTAL = ("AR", "AL", "AZ", "DR", "DL", "BR")
 _BEARING = re.compile(r"([NS])\s*([0-9.]+)\s*([EW])", re.IGNORECASE)
 _DATE = re.compile(r"--\s*DT\s*(\d\d?)-(\d\d?)-(\d{4})", re.IGNORECASE)
@@ -52,7 +56,7 @@ def read(text, file, log):
     """FieldBook of the text of an RW5 file."""
     book, state = FieldBook(file, "rw5"), _State()
     for row, line in enumerate(text.split("\n"), 1):
-        line = line.strip("\r\x1a \t")
+        line = line.strip()
         if line.startswith("--"):
             _take_note(book, row, line, state)
         elif line:

@@ -43,13 +43,13 @@ class _State:
 def read(text, file, log):
     """FieldBook of the text of an SDR file."""
     book, state = FieldBook(file, "sdr"), _State()
-    lines = [line.strip("\r\x1a").lstrip("\x02") for line in text.split("\n")]
+    lines = text.split("\n")
     derived = any(line[:3] == "09F" for line in lines)
     for row, line in enumerate(lines, 1):
-        if not line.strip() or line.strip("\x03").isspace():
+        if not line.strip():
             continue
         kind, way = line[:2], line[2:4]
-        if line.strip("\x03 ") == "0000":  # ends a file
+        if line.strip() == "0000":  # ends a file
             continue
         if kind == "00":
             _take_header(book, log, row, line, state)
@@ -146,7 +146,7 @@ def _fields(line, state, names, numbers):
     for width in widths:
         found.append(line[place : place + width].strip())
         place += width
-    return [*found, line[place:].strip("\x03 ")]
+    return [*found, line[place:].strip()]
 
 
 def _numbers(book, log, row, texts, scale):

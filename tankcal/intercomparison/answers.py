@@ -16,6 +16,7 @@ from tankcal.job.folder import MAX_SETTINGS_BYTES, csv_marks, read_csv, read_tom
 from tankcal.job.tables import SEPARATORS, nearest, read_bytes
 from tankcal.messages import list_some, message
 from tankcal.record.intercomparison import ANSWERS, Answer, AnswersFile, Participant
+from tankcal.text.decoding import find_encoding
 
 PARTICIPANT = "participant.toml"
 ROWS = (
@@ -257,9 +258,10 @@ def _read_table(path, tank, method, asked, marks, log):
 
 def _likely_marks(data):
     """(separator, decimal mark) of a table whose participant.toml cannot be read: told already."""
-    heading = data.partition(b"\n")[0].decode("utf-8", "replace")
+    text = data.decode(find_encoding(data), "replace")
+    heading = text.partition("\n")[0]
     separator = next((one for one in SEPARATORS[1:] if one in heading), SEPARATORS[0])
-    return separator, "," if separator != "," and b"," in data else "."
+    return separator, "," if separator != "," and "," in text else "."
 
 
 def _factors(name, rows, U, k, coverage, log):

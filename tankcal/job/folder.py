@@ -24,12 +24,14 @@ from tankcal.job.tables import (
     shown,
 )
 from tankcal.messages import message
+from tankcal.text.decoding import decode_text
 
 MAX_SETTINGS_BYTES = 1_000_000
 MAX_SETTINGS_LINE = 4000  # characters
 DECIMALS = (".", ",")
 OF_INSPECTIONS = ("settlement.csv", "edge_profiles.csv")  # beside a job, no part of it
 _LONGEST_START = 100_000  # bytes, of comments before a heading
+_TWICE = ("Cannot overwrite", "Cannot declare", "Cannot redefine")  # as tomllib begins these
 _DECIMAL_COMMA = re.compile(
     r"(\s*[\w.\"'-]+\s*=\s*[+-]?\d+),(\d+(?:[eE][+-]?\d+)?)\s*(?:#.*)?", re.DOTALL
 )
@@ -148,26 +150,10 @@ def _refuse_unknown_files(names, log):
 
 
 def decode(file, data, log):
-    """The text of a UTF-8 file (a byte order mark is allowed), or None after telling `log`."""
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        log.problem(
-            file,
-            message("is_utf16", "written as UTF-16; save it as {wanted}", wanted=_utf8(file)),
-            1,
-        )
-        return None
-    if b"\0" in data:
-        row = data[: data.index(b"\0")].count(b"\n") + 1
-        log.problem(
-            file,
-            message("zero_byte", "a zero byte; expected text (UTF-8): is this really a text file?"),
-            row,
-        )
-        return None
+    """The text of a file in UTF-8 or UTF-16, or None after telling `log`."""
     try:
-        return data.decode("utf-8-sig")
+        text = decode_text(data)
     except UnicodeDecodeError as error:
-        # error.start counts without the byte order mark, which holds no line break
         row = data[: error.start].count(b"\n") + 1
         log.problem(
             file,
@@ -179,6 +165,15 @@ def decode(file, data, log):
             row,
         )
         return None
+    if "\0" in text:
+        row = text[: text.index("\0")].count("\n") + 1
+        log.problem(
+            file,
+            message("zero_byte", "a zero byte; expected text (UTF-8): is this really a text file?"),
+            row,
+        )
+        return None
+    return text
 
 
 def _utf8(file):
@@ -306,7 +301,10 @@ def _row_of(error):
 def _reason(error):
     if isinstance(error, RecursionError):
         return message("too_deep", "too deeply nested")
-    return re.sub(r"\s*\(at .*\)$", "", str(error))
+    reason = re.sub(r"\s*\(at .*\)$", "", str(error))
+    if reason.startswith(_TWICE):
+        return message("toml_given_twice", "a key or a section is given twice")
+    return reason
 
 
 def _toml_rows(text):

@@ -17,6 +17,7 @@ from tankcal.recalibration.inputs import read_shell, rows_file
 from tankcal.recalibration.reading import read_former
 from tankcal.record.history import CheckInHistory, InspectionInHistory
 from tankcal.record.inspection import INSPECTION, VERDICTS
+from tankcal.text.decoding import decode_text, find_encoding
 
 RECORD = "record.json"
 MOST_NAMED = 10  # tanks, in a message
@@ -178,7 +179,8 @@ def _read(found, path, name, tanks, seen, is_sought):
     if path.suffix.lower() in TABLES:
         _take_former(found, path, name, seen)
         return
-    content = path.read_bytes()
+    data = path.read_bytes()
+    content = data if find_encoding(data) == "utf-8" else _in_utf8(data, path)
     if is_sought and tanks and not any(_may_name(content, one) for one in tanks):
         if content.rstrip()[-1:] != b"}":
             text = message("history_cut_off", "is cut off: of which tank it was is not known")
@@ -190,7 +192,7 @@ def _read(found, path, name, tanks, seen, is_sought):
         text = message("history_not_ours", "no file of tankcal: passed over")
         found.left_out.append(Problem(name, text))
         return
-    digest = hashlib.sha256(content).hexdigest()
+    digest = hashlib.sha256(data).hexdigest()
     if kind.startswith(f"{INSPECTION.name}/"):
         _take_inspection(found, INSPECTION.migrated(saved, path.name), name, digest, tanks, seen)
     else:
@@ -205,12 +207,23 @@ def _may_name(content, tank):
     )
 
 
+def _in_utf8(data, path):
+    try:
+        return decode_text(data).encode("utf-8")
+    except ValueError as error:
+        raise _unreadable(error, path) from None
+
+
 def _parsed(content, path):
     try:
         return json.loads(content)
     except (ValueError, RecursionError) as error:
-        text = message("history_no_json", "cannot be read: {error}", error=str(error))
-        raise InputError(Problem(path.name, text)) from None
+        raise _unreadable(error, path) from None
+
+
+def _unreadable(error, path):
+    text = message("history_no_json", "cannot be read: {error}", error=str(error))
+    return InputError(Problem(path.name, text))
 
 
 def _is_again(found, name, digest, seen):

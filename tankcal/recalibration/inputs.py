@@ -15,6 +15,7 @@ from tankcal.recalibration.comparison import compare
 from tankcal.recalibration.read_courses import read_courses
 from tankcal.recalibration.reading import read_former
 from tankcal.record.comparison import ComparisonFile
+from tankcal.text.decoding import decode_text
 
 RECORD = "record.json"
 
@@ -108,7 +109,7 @@ def rows_file(path):
     """The file that holds the rows: beside a former.toml the one that it names."""
     if path.suffix.lower() != ".toml":
         return path
-    return path.parent / tomllib.loads(path.read_text(encoding="utf-8"))["former"]["file"]
+    return path.parent / tomllib.loads(decode_text(path.read_bytes()))["former"]["file"]
 
 
 def read_shell(path, log):

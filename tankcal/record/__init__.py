@@ -12,6 +12,7 @@ from tankcal.record import manifest
 from tankcal.record.long_tables import attached, copy_record, split, without_tables
 from tankcal.record.plain_data import whole
 from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
+from tankcal.text.decoding import read_json
 
 __all__ = [
     "FORMAT", "VERSION", "copy_record", "load", "migrated", "read", "record_of",
@@ -114,7 +115,7 @@ def load(path, *, is_checked=True):
     name = Path(path).name
     try:
         with without_collection():
-            record = json.loads(Path(path).read_text(encoding="utf-8"))
+            record = read_json(path)
     except (OSError, ValueError, RecursionError) as error:
         expected = message(
             "record_unreadable", "cannot be read as a record: {error}", error=str(error)

@@ -17,6 +17,7 @@ from tankcal.job.tables import Log, nearest, read_bytes
 from tankcal.messages import message
 from tankcal.report import LETTERHEAD
 from tankcal.report.logo import logo_problem
+from tankcal.text.decoding import read_json
 
 PLACE = "place"  # of a mark: an empty frame
 LEAST_CONTRAST = 4.5  # of text on white paper: WCAG 2.2, 1.4.3
@@ -183,7 +184,7 @@ def read_saved(path):
     """The data of a letterhead that `Letterhead.save` wrote; raises InputError for any other."""
     name = Path(path).name
     try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
+        data = read_json(path)
     except (OSError, ValueError) as error:
         raise InputError(
             Problem(

@@ -1,6 +1,5 @@
 """The folder of a saved file that is no record, such as inspection.json, and its papers."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +8,7 @@ from tankcal.errors import InputError, Problem, TankcalError, VocabularyError
 from tankcal.messages import Message
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.report import folders
+from tankcal.text.decoding import read_json
 
 
 def write_pages(pages, paper, folder, file, page_file=None):
@@ -59,7 +59,7 @@ class SavedFolder:
         """Read the saved file; raises InputError when it is none."""
         name = Path(path).name
         try:
-            found = json.loads(Path(path).read_text(encoding="utf-8"))
+            found = read_json(path)
         except (OSError, ValueError, RecursionError) as error:
             raise InputError(Problem(name, self.unreadable(str(error)))) from error
         return self.saved_format.migrated(found, name)

@@ -14,10 +14,11 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.job.contract import COLUMNS, KINDS, columns_of
-from tankcal.job.folder import csv_marks, decode, read_toml
+from tankcal.job.folder import csv_marks, decode, parsed_toml, read_toml
 from tankcal.job.loading import load_edited
 from tankcal.job.tables import REGISTERS, SETTINGS_FILE, TABLES, Log, meant, read_bytes
 from tankcal.messages import message
+from tankcal.text.decoding import decode_text, find_encoding
 from tankcal.workbench.book import new_sheet_table, read_book, written_book
 from tankcal.workbench.findings import Check, found_in
 from tankcal.workbench.keys import NOT_HERE, SETTINGS, EditedKeys
@@ -71,12 +72,15 @@ class Draft:
         "job", and the lists of cameras, instruments, clouds and meters that are there.
     locked : Message or None
         Why nothing may be edited.
+    unreadable : list of Problem
+        Files of keys that cannot be read, and so cannot be edited here.
     """
 
     def __init__(self, source):
         self.source = source
         self.is_book = source.is_file()
         self.locked = None
+        self.unreadable = []
         self._disk = {}  # {file: its bytes, None: not there}
         self._first = {}  # {file of a table or of keys: state that is on the disk}
         self._before, self._marks = [], (",", ".")
@@ -103,6 +107,7 @@ class Draft:
 
     def _read_folder(self):
         log = Log()
+        self.unreadable = log.problems
         data = self._content(SETTINGS_FILE)
         settings = None
         if data is not None:
@@ -112,7 +117,9 @@ class Draft:
         marks = csv_marks(SETTINGS_FILE, settings or {}, Log())
         for name in REGISTERS:
             if (self.source / f"{name}.toml").is_file():
-                self._add_keys(name, f"{name}.toml", self._content(f"{name}.toml"))
+                data = self._content(f"{name}.toml")
+                if data is not None and parsed_toml(f"{name}.toml", data, log) is not None:
+                    self._add_keys(name, f"{name}.toml", data)
         if marks is None:
             return
         self._marks = marks
@@ -121,15 +128,16 @@ class Draft:
             if (self.source / file).is_file():
                 data = self._content(file)
                 if data is not None and decode(file, data, Log()) is not None:
-                    text = data.decode("utf-8")
+                    text = data.decode(find_encoding(data))  # a byte order mark is kept
                     self.tables[name] = read_csv_table(name, file, text, *marks)
 
     def _add_keys(self, name, file, data):
         """Keys that tomllib and tomlkit both read; others are looked at by the check alone."""
         import tomlkit
+        from tomlkit.exceptions import TOMLKitError  # a key given twice is no ValueError
 
-        with suppress(ValueError, AttributeError, RecursionError):
-            text = data.decode("utf-8")
+        with suppress(ValueError, AttributeError, RecursionError, TOMLKitError):
+            text = decode_text(data)
             tomlkit.parse(text)
             made = EditedKeys(name, file, text)
             if made.entries is not None:

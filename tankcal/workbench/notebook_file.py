@@ -7,6 +7,7 @@ import re
 import tankcal
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.text.decoding import read_json
 from tankcal.workbench.desk import open_job
 
 FOLDER_NAME = "tankcal.ipynb"
@@ -69,6 +70,8 @@ def make_notebook(source, path, language=None):
 def write_notebook(source, path, language=None):
     """Write the notebook of a job; returns whether it was written.
 
+    A file of keys that cannot be read does not prevent it: the notebook shows what is wrong.
+
     One that somebody changed is left as it is (False); so is one of the same cells, whose outputs
     stay. Any other file of that name is refused (InputError).
     """
@@ -89,7 +92,7 @@ def write_notebook(source, path, language=None):
 def _read(path):
     """The notebook that lies there; InputError for what is none."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = read_json(path)
         if isinstance(found["cells"], list) and isinstance(found["metadata"], dict):
             _digest(found["cells"])
             return found

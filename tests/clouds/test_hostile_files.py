@@ -200,9 +200,7 @@ def test_changed_xml_is_read_when_it_is_sound(tmp_path, sound):
     assert_allclose(found, some_wall(COUNT))
 
 
-@pytest.mark.parametrize(
-    "quaternion", [(0, 0, 0, 0), (2, 0, 0, 0), (0.9, 0, 0, 0), (1e200, 0, 0, 0)]
-)
+@pytest.mark.parametrize("quaternion", [(2, 0, 0, 0), (0.9, 0, 0, 0), (1e200, 0, 0, 0)])
 def test_pose_of_e57(tmp_path, quaternion):
     write_e57(tmp_path / "a.e57", [some_wall(5)], poses=[(quaternion, (0, 0, 0))])
     said = refused_header(tmp_path, "a.e57", (tmp_path / "a.e57").read_bytes())

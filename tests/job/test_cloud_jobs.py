@@ -10,6 +10,7 @@ import pytest
 from conftest import EXAMPLE
 from job_builder import assert_same_job, job_parts, write_book, write_folder
 from scanned_tanks import SCANS, scanned_parts
+from written_clouds import some_wall, write_e57
 
 import tankcal
 from tankcal.errors import InputError
@@ -122,6 +123,42 @@ def test_rows_of_a_pose_are_counted(tmp_path):
         "A.pose: 3 rows; expected 4, four for each of the 1 scans"
         in told(tmp_path, small(pose=pose))[0]
     )
+
+
+ZEROS, UNIT = (0, 0, 0, 0), (1, 0, 0, 0)
+FOUR = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+
+
+@pytest.mark.parametrize(
+    ("poses", "given", "code"),
+    [
+        ([(ZEROS, (0, 0, 0))], None, None),
+        ([(ZEROS, (1, 2, 3))], None, None),
+        ([(ZEROS, (1, 2, 3))], "file", "file_without_pose"),
+        ([(ZEROS, (0, 0, 0))] * 2, None, None),
+        ([(ZEROS, (1, 2, 3))] * 2, None, "pose_without_rotation"),
+        ([(ZEROS, (1, 2, 3))] * 2, FOUR * 2, None),
+        ([(ZEROS, (1, 2, 3)), (UNIT, (1, 2, 3))], "file", "file_without_pose"),
+        ([(ZEROS, (1, 2, 3)), (UNIT, (1, 2, 3))], None, "pose_of_scans_missing"),
+        ([(UNIT, (1, 2, 3))] * 2, "file", None),
+    ],
+)
+def test_a_quaternion_of_zeros_in_a_job(tmp_path, poses, given, code):
+    """No pose: a warning where the key is blank; refused where a pose is necessary."""
+    parts = small()
+    parts.registers["clouds"]["A"]["file"] = "zeros.e57"
+    if given is not None:
+        parts.registers["clouds"]["A"]["pose"] = given
+    folder = write_folder(tmp_path / "job", parts)
+    write_e57(folder / "zeros.e57", [some_wall(200)] * len(poses), poses=poses)
+    try:
+        found = tankcal.load(folder).warnings
+        problems = []
+    except InputError as error:
+        problems = [one.expected.code for one in error.problems if one.column == "A.pose"]
+    assert problems == ([] if code is None else [code])
+    if code is None and len(poses) == 1:
+        assert [one.expected.code for one in found].count("cloud_file_e57_zero_pose") == 1
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,7 @@ def test_spaces_before_quotation_marks_are_ignored():
         (b"\n,,\n# only a comment\n", None, "empty"),
         (b"a,b\n1,\0\n", 2, "zero byte"),
         ("a,b\n1,2\né,3\n".encode("latin-1"), 3, "not UTF-8"),
-        ("a,b\n".encode("utf-16"), 1, "UTF-16"),
+        ("a,b\n".encode("utf-16")[:-1], 1, "not UTF-8"),
         (b'a,b\n"1,2\n3,4\n', 2, "quotation marks"),
         (b"a,b\n1,2\n3\n", 3, "1 cells, expected 2"),
         (b"a,b\n1,2,3\n", 2, "3 cells, expected 2 as in the heading; for decimal commas"),
@@ -86,7 +86,7 @@ def test_settings_know_their_rows():
     ("text", "row", "words"),
     [
         ("[tank]\nid = T-1\n", 2, "Invalid value"),
-        ("[tank]\nid = 1\nid = 2\n", 3, "overwrite"),
+        ("[tank]\nid = 1\nid = 2\n", 3, "given twice"),
         ("id = 1\n", 1, "is in no [section]"),
         ("x = " + "[" * 3000, None, "too deeply nested"),
         ("x = 1" + "0" * 5000, 1, "more than 4000 characters"),
@@ -124,15 +124,12 @@ def test_a_file_of_nothing_but_decimal_commas_ends():
     assert len(log.problems) == MAX_PROBLEMS_PER_FILE
 
 
-@pytest.mark.parametrize(
-    ("encoding", "words"), [("latin-1", "not UTF-8; save the file"), ("utf-16", "UTF-16; save it")]
-)
-def test_settings_are_no_csv_in_words_about_their_encoding(encoding, words):
+def test_settings_are_no_csv_in_words_about_their_encoding():
     log = Log()
-    assert read_toml("plan.toml", 'owner = "João"\n'.encode(encoding), log) == (None, {})
+    assert read_toml("plan.toml", 'owner = "João"\n'.encode("latin-1"), log) == (None, {})
     (problem,) = log.problems
     assert problem.row == 1
-    assert problem.expected.endswith(f"{words} as UTF-8 text")
+    assert problem.expected.endswith("not UTF-8; save the file as UTF-8 text")
 
 
 def test_deeply_nested_settings_are_unknown_sections():

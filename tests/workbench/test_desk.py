@@ -123,9 +123,9 @@ def test_settings_show_what_must_be_given(folder):
 def test_a_missing_table_is_told(folder):
     made = open_job(folder, live=False)
     assert "no such table" in made.welds._repr_mimebundle_()["text/html"]
-    (folder / "courses.csv").write_bytes(b"\xff\xfe")
+    (folder / "courses.csv").write_bytes(b"\xff")
     made = open_job(folder, live=False)
-    assert "UTF-16" in made.courses._repr_mimebundle_()["text/html"]
+    assert "UTF-8" in made.courses._repr_mimebundle_()["text/html"]
     with pytest.raises(AttributeError):
         made.nothing  # noqa: B018
 

@@ -1,4 +1,4 @@
-"""Text of OpenCV cameras: FileStorage YAML as OpenCV writes it, the like of ROS, and JSON.
+"""Text of OpenCV cameras: YAML and XML of FileStorage, YAML of ROS, and JSON.
 
 A matrix is a node with rows, cols and data, or in JSON a list of lists. Read are the names of the
 matrix, of the coefficients and of the image's size that the samples of OpenCV and others use.
@@ -10,7 +10,13 @@ import re
 import numpy as np
 
 from tankcal.camera.formats.opencv import COUNTS, OpenCV
-from tankcal.camera.formats.texts import exact_text, given_twice, short_text
+from tankcal.camera.formats.texts import (
+    exact_text,
+    given_twice,
+    short_text,
+    tell_outermost,
+    xml_root,
+)
 from tankcal.messages import message
 
 MATRIX = ("camera_matrix", "cameramatrix", "intrinsic_matrix", "k", "mtx", "camera_mtx")
@@ -18,14 +24,16 @@ COEFFICIENTS = ("distortion_coefficients", "distcoeffs", "dist_coeffs", "dist", 
 WIDTH, HEIGHT = ("image_width", "width"), ("image_height", "height")
 MODELS = ("plumb_bob", "rational_polynomial", "")
 ENTRY = re.compile(r"( *)(?:-\s+)?\"?([A-Za-z_][\w .-]*?)\"?\s*:(?:\s+(.*))?$")
-LIST = re.compile(r"\[([^\[\]]*)\]")
+ITEM = re.compile(r"\s*-\s+([^:]*)$")
+COMMENT = re.compile(r"\s#.*$")
+XML_ROOT = "opencv_storage"
 
 
 def parse(text, notes):
     """(OpenCV, (columns, lines) or None), or None; problems go to notes."""
-    is_json = text.lstrip().startswith("{")
-    nodes = _json(text, notes) if is_json else _yaml(text, notes)
-    if nodes is None:
+    parsers = {"{": _json, "<": _xml}
+    nodes = parsers.get(text.lstrip()[:1], _yaml)(text, notes)
+    if nodes is None or notes.problems:
         return None
     if _is_fisheye(nodes):
         notes.tell(
@@ -176,6 +184,30 @@ def _json(text, notes):
     return found
 
 
+def _xml(text, notes):
+    """Nodes of the XML of FileStorage: matrices, numbers and texts."""
+    root = xml_root(text, notes)
+    if root is None:
+        return None
+    if root.tag != XML_ROOT:
+        expected = message("convert_opencv_root", "expected {root}, as OpenCV writes it",
+                           root=XML_ROOT)  # fmt: skip
+        tell_outermost(root, expected, notes)
+        return None
+    nodes = {}
+    for child in root:
+        key = child.tag.lower()
+        if key in nodes:
+            notes.tell(given_twice(), key=short_text(key))
+        if len(child):
+            parts = {one.tag.lower(): (one.text or "").strip() for one in child}
+            nodes[key] = parts | {"data": parts.get("data", "").split()}
+        else:
+            words = (child.text or "").split()
+            nodes[key] = words if key in MATRIX + COEFFICIENTS else " ".join(words)
+    return nodes
+
+
 def _yaml(text, notes):
     """Nodes of what cameras have of YAML: keys, matrices, lists in brackets."""
     nodes, inside, row = {}, None, 0
@@ -189,18 +221,11 @@ def _yaml(text, notes):
         if not entry:
             continue  # a list of other things, over several lines
         indent, key, value = len(entry[1]), entry[2].lower(), (entry[3] or "").strip()
-        while value.startswith("[") and "]" not in value and row < len(lines):
-            value += " " + lines[row].strip()
-            row += 1
-        if value.startswith("[") and not LIST.fullmatch(value):
-            notes.tell(
-                message("convert_endless_list", "a list without end; is the file complete?"),
-                number,
-                short_text(key),
-            )
-            return None
+        value, row = _whole_value(value, lines, row)
         if value.startswith("["):
-            value = [one.strip() for one in value[1:-1].split(",") if one.strip()]
+            value = _list(value, number, key, notes)
+            if value is None:
+                return None
         home = nodes if indent == 0 or inside is None else inside
         if key in home:
             notes.tell(given_twice(), number, short_text(key))
@@ -209,6 +234,50 @@ def _yaml(text, notes):
         if indent == 0:
             inside = home[key] if is_node else None
     return nodes
+
+
+def _whole_value(value, lines, row):
+    """(value of a key with its lines below, number of the next line).
+
+    A list in brackets may go over lines; its items may also stand below, each after a dash.
+    """
+    value = COMMENT.sub("", f" {value}").strip()
+    while value.startswith("[") and value.count("[") > value.count("]") and row < len(lines):
+        value += " " + COMMENT.sub("", f" {lines[row]}").strip()
+        row += 1
+    items = []
+    while value == "" and row < len(lines) and (item := ITEM.match(lines[row])):
+        items.append(COMMENT.sub("", item[1]).strip())
+        row += 1
+    if items and any(re.match(r"[\[\d.+-]", one) for one in items):
+        value = f"[{', '.join(items)}]"
+    return value, row
+
+
+def _list(value, number, key, notes):
+    """Numbers of a list in brackets as texts, or None after telling what is wrong.
+
+    Some programs leave out all commas; between commas, a blank is a comma that was forgotten, or
+    the list has decimal commas.
+    """
+    if not value.endswith("]") or value.count("[") != value.count("]"):
+        text = message("convert_endless_list", "a list without end; is the file complete?")
+        notes.tell(text, number, short_text(key))
+        return None
+    inside = re.sub(r"\]\s*,?\s*\[", ", " if "," in value else " ", value[1:-1]).strip("[] ")
+    if "," not in inside:
+        return inside.split()
+    items = [one.strip() for one in inside.split(",") if one.strip()]
+    bad = next((one for one in items if len(one.split()) > 1), None)
+    if bad is not None and key in MATRIX + COEFFICIENTS + ("data",):
+        text = message(
+            "convert_no_comma",
+            "{found} between commas; expected numbers with a decimal point and a comma after each",
+            found=short_text(bad),
+        )
+        notes.tell(text, number, short_text(key))
+        return None
+    return items
 
 
 def text_of(camera, size_px):

@@ -15,10 +15,15 @@ PhotoScan 1.2 to 1.4.
 """
 
 from dataclasses import dataclass
-from xml.etree import ElementTree
 
 from tankcal.camera.formats.brown import Brown, from_brown, to_brown
-from tankcal.camera.formats.texts import exact_text, given_twice, short_text
+from tankcal.camera.formats.texts import (
+    exact_text,
+    given_twice,
+    short_text,
+    tell_outermost,
+    xml_root,
+)
 from tankcal.messages import message
 
 TERMS = ("cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
@@ -139,39 +144,13 @@ def parse(text, notes):
 
 
 def _root(text, notes):
-    lower = text.lower()
-    if "<!doctype" in lower or "<!entity" in lower:
-        notes.tell(
-            message(
-                "convert_metashape_doctype",
-                "a document type or entities; expected a calibration as Metashape saves it",
-            )
-        )
-        return None
-    try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError, RecursionError) as error:
-        row = getattr(error, "position", (None,))[0]
-        notes.tell(
-            message(
-                "convert_no_xml", "not readable XML ({error}); is the file complete?", error=error
-            ),
-            row,
-        )
-        return None
-    if root.tag != "calibration":
+    root = xml_root(text, notes)
+    if root is not None and root.tag != "calibration":
         expected = message(
             "convert_metashape_root",
             "expected calibration: save it in Tools, Camera Calibration, as Agisoft XML",
         )
-        notes.tell(
-            message(
-                "convert_outermost",
-                "{found} as the outermost element; {expected}",
-                found=short_text(root.tag),
-                expected=expected,
-            )
-        )
+        tell_outermost(root, expected, notes)
         return None
     return root
 

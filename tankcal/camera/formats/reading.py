@@ -1,7 +1,7 @@
 """One door for cameras of other programs: the file tells which of them it is from.
 
 kind       file
-opencv     YAML of FileStorage, JSON with K and dist; opencv-json means the same
+opencv     YAML and XML of FileStorage, JSON with K and dist; opencv-json means the same
 colmap     cameras.txt
 metashape  XML of a calibration
 pix4d      PROJECT_pix4d_calibrated_internal_camera_parameters.cam
@@ -17,6 +17,7 @@ from tankcal.camera.formats.opencv import from_opencv
 from tankcal.camera.formats.texts import LONGEST, Notes, only_letters, short_text
 from tankcal.errors import SolutionError
 from tankcal.messages import message
+from tankcal.text.decoding import decode_text
 
 SAME_PIXEL = 0.01  # pixels of a file and as given may differ by as much, for rounding
 PIXELS_UM = (0.1, 100.0)  # of cameras and scanners
@@ -125,17 +126,18 @@ def _text(path, notes):
             )
         )
         return None
-    if b"\0" in data:
-        notes.tell(message("convert_no_text", "not text; expected a text file (UTF-8)"))
-        return None
     try:
-        return data.decode("utf-8-sig")
+        text = decode_text(data)
     except UnicodeDecodeError as error:
         notes.tell(
             message("convert_no_utf8", "a letter that is not UTF-8"),
             data[: error.start].count(b"\n") + 1,
         )
         return None
+    if "\0" in text:
+        notes.tell(message("convert_no_text", "not text; expected a text file (UTF-8)"))
+        return None
+    return text
 
 
 def _recognised(text, notes):
@@ -144,7 +146,7 @@ def _recognised(text, notes):
     lines = [line.split() for line in text.splitlines()[:200]]
     words = [line[0] for line in lines if line and not line[0].startswith("#")]
     if start.startswith("<"):
-        return "metashape"
+        return "opencv" if f"<{filestorage.XML_ROOT}" in text else "metashape"
     if start.startswith(("%YAML", "{")) or "opencv-matrix" in text or "camera_matrix:" in text:
         return "opencv"
     if "camera calibration file" in start.lower() or "camera_calibration_file" in start.lower():

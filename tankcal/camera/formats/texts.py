@@ -5,6 +5,7 @@ Sizes of files are limited, so that a hostile one is refused before it is parsed
 
 import math
 import re
+from xml.etree import ElementTree
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
@@ -104,6 +105,42 @@ class Notes:
             key,
         )
         return "camera"
+
+
+def xml_root(text, notes):
+    """Outermost element of an XML text without a document type, or None; problems go to notes."""
+    lower = text.lower()
+    if "<!doctype" in lower or "<!entity" in lower:
+        notes.tell(
+            message(
+                "convert_doctype",
+                "a document type or entities; expected XML as the program saves it",
+            )
+        )
+        return None
+    try:
+        return ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError, RecursionError) as error:
+        row = getattr(error, "position", (None,))[0]
+        notes.tell(
+            message(
+                "convert_no_xml", "not readable XML ({error}); is the file complete?", error=error
+            ),
+            row,
+        )
+        return None
+
+
+def tell_outermost(root, expected, notes):
+    """Report an XML file whose outermost element is another one."""
+    notes.tell(
+        message(
+            "convert_outermost",
+            "{found} as the outermost element; {expected}",
+            found=short_text(root.tag),
+            expected=expected,
+        )
+    )
 
 
 def given_twice():

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from tankcal.clouds.contents import WHOLE, CloudPiece, ScanHeader
 from tankcal.clouds.formats.counted_text import looks_as_pts, looks_as_ptx
-from tankcal.clouds.formats.files import Piece, no_points
+from tankcal.clouds.formats.files import Piece, count_mismatch, no_points
 from tankcal.clouds.formats.lines import (
     BLOCK,
     COMMENTS,
@@ -14,8 +14,11 @@ from tankcal.clouds.formats.lines import (
     NUMBER,
     Layout,
     Lines,
+    count_lines,
+    count_rows,
     parse_rows,
     shown,
+    whole_number,
 )
 from tankcal.errors import InputError
 from tankcal.messages import message
@@ -42,13 +45,31 @@ def find_kind(file):
                 "of 4",
             )
         )
-    return "pts" if looks_as_pts(lines) else "xyz"
+    is_counted = looks_as_pts(lines) and _begins_with_number(lines[1])
+    return "pts" if is_counted else "xyz"
 
 
 def describe(file):
-    """The one scan of a file, its number of points not known before it is read."""
-    _find_layout(file)
-    return "xyz", (ScanHeader("", None),)
+    """The one scan of a file; its number of points is known where a line before them states it."""
+    _, heading, count = _find_layout(file)
+    if count is not None:
+        _check_count(file, heading, count)
+    return "xyz", (ScanHeader("", count),)
+
+
+def _check_count(file, heading, count):
+    """InputError where a file has not as many points as the line before them states."""
+    found = 0
+    for count_of in (count_lines, count_rows):  # without comments only where these matter
+        with file.path.open("rb") as stream:
+            lines = Lines(file, stream)
+            lines.take(heading)
+            found = 0
+            while (block := lines.take(1 << 20)[0]) and found <= count:
+                found += count_of(block)
+        if found == count:
+            return
+    raise count_mismatch(file, count, found)
 
 
 def rows_about(file):
@@ -58,7 +79,7 @@ def rows_about(file):
 
 def shares(file, points_each):
     """Ranges of bytes that end with a line, about so many rows each; the first has the heading."""
-    _, heading = _find_layout(file)
+    _, heading, _ = _find_layout(file)
     each = max(1, round(points_each * file.bytes / rows_about(file)))
     edges = [0]
     with file.path.open("rb") as stream:
@@ -76,7 +97,7 @@ def shares(file, points_each):
 
 def pieces(file, chunk, share=WHOLE):
     """Points of a share of a file."""
-    layout, heading = _find_layout(file)
+    layout, heading, _ = _find_layout(file)
     is_empty = share == WHOLE
     with file.path.open("rb") as stream:
         stream.seek(share.first)
@@ -132,19 +153,35 @@ def _first_lines(file):
 
 
 def _find_layout(file):
-    """The `Layout` of the rows and how many lines stand before them."""
-    lines, heading = _first_lines(file), None
+    """(`Layout` of the rows, number of the lines before them, stated number of points or None).
+
+    CloudCompare can write a line of titles, and below it a line with the number of points.
+    """
+    lines, heading, count = _first_lines(file), None, None
     for first, line in enumerate(lines):
         is_comment = line.startswith(COMMENTS)
         if line and not is_comment and _begins_with_number(line):
             rows = [row for row in lines[first:] if row and not row.startswith(COMMENTS)]
-            return _judge(file, rows[:JUDGED], heading, first), first
+            if count is None and _is_count(line, [*filter(None, lines[first + 1 :])], heading):
+                count = whole_number(line)
+                continue
+            return _judge(file, rows[:JUDGED], heading, first), first, count
         if line:
             found = _read_heading(line.lstrip(b"#/% ") if is_comment else line, first, is_comment)
             if found is None and not is_comment:
                 raise _bad_heading(file, line, first)
             heading = found or heading
     raise no_points(file)
+
+
+def _is_count(line, below, heading):
+    """Whether a line is the number of points: alone in it, above titles, or below them."""
+    if whole_number(line) is None or not below:
+        return False
+    if heading is None:
+        return _read_heading(below[0].lstrip(b"#/% "), 0, False) is not None
+    row = next((one for one in below if not one.startswith(COMMENTS)), b"")
+    return len(re.split(rb"[\s;,]+", row)) >= 3
 
 
 def _bad_heading(file, line, at):

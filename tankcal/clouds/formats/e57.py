@@ -163,10 +163,12 @@ def _scan_of(file, number, node):
     bits = [_bits(names[name]) for name in names]
     problems += _count_problems(file, number, points, count, bits)
     problems += _field_problems(number, [names[name] for name in fields])
-    pose = _pose(number, node, problems)
+    pose, warning, is_placed = _pose(number, node, problems), None, False
+    if pose is not None and not pose[:3, :3].any():
+        pose, warning, is_placed = None, _no_rotation(number), bool(pose[:3, 3].any())
     singles = all(names[name].is_single for name in fields)
     return _Scan(
-        ScanHeader(node.child("name").text.strip()[:200], max(count, 0), pose),
+        ScanHeader(node.child("name").text.strip()[:200], max(count, 0), pose, warning, is_placed),
         fields,
         state if state in names else "",
         "f" if singles and is_cartesian else "d",
@@ -233,7 +235,10 @@ def _field_problems(number, nodes):
 
 
 def _pose(number, node, problems):
-    """(4, 4) of the rotation (a quaternion w, x, y, z) and translation; None: no pose."""
+    """(4, 4) of the rotation (a quaternion w, x, y, z) and translation; None: no pose.
+
+    The rotation is zero for a quaternion of zeros.
+    """
     pose = node.find("pose")
     if pose is None:
         return None
@@ -241,6 +246,9 @@ def _pose(number, node, problems):
     w, x, y, z = (turn.number_of(name) for name in "wxyz") if turn else (1.0, 0.0, 0.0, 0.0)
     found = np.eye(4)
     found[:3, 3] = [shift.number_of(name) for name in "xyz"] if shift else 0.0
+    if w == x == y == z == 0 and np.isfinite(found).all():
+        found[:3, :3] = 0.0
+        return found
     length = math.sqrt(w * w + x * x + y * y + z * z) if max(map(abs, (w, x, y, z))) < 2 else 0.0
     if not (abs(length - 1) <= UNIT_QUATERNION and np.isfinite(found).all()):
         problems.append(
@@ -259,3 +267,16 @@ def _pose(number, node, problems):
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
     return found
+
+
+def _no_rotation(number):
+    """Warning about a quaternion of zeros, which some programs write where they have no rotation.
+
+    Older versions of libE57Format and pye57 do so; CloudCompare reads such a file without its pose.
+    """
+    return message(
+        "cloud_file_e57_zero_pose",
+        "the rotation of scan {number} is a quaternion of zeros: read without a pose; if the scan"
+        " has one, give it as four rows of four numbers",
+        number=number,
+    )

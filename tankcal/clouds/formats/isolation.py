@@ -7,6 +7,7 @@ ends it when it gives nothing for long.
 
 import contextlib
 import json
+import re
 import subprocess
 import sys
 import threading
@@ -151,6 +152,15 @@ def _failure(file, reason):
             message(
                 "cloud_file_memory",
                 "its reader asked for more memory than it may have: is the file damaged?",
+            )
+        )
+    if re.search(r"not supported|unsupported", reason, re.IGNORECASE):
+        return file.refusal(
+            message(
+                "cloud_file_unsupported",
+                "its reader does not support it ({reason}); expected points as present programs"
+                " write them: convert it to LAS or save it again with the program that wrote it",
+                reason=reason,
             )
         )
     return file.refusal(

@@ -27,6 +27,7 @@ LEAST_RECORD = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # bytes, by the poi
 VLR, EVLR = 54, 60  # least bytes of a variable length record
 LASZIP_ID = 22204
 FARTHEST = 1e11  # an offset: 1e8 m in mm
+ONE_STREAM = 1  # compressor of LASzip 1: all points in one stream, without chunks
 VARIABLE = 0xFFFFFFFF  # the size of a chunk that the chunk table tells
 
 
@@ -61,7 +62,7 @@ def shares(file, points_each):
     if header.laszip is None:
         return ranges_of(header.count, points_each)
     compressor, size = _chunks_in(header.laszip)
-    if compressor == 1 or size == VARIABLE:
+    if compressor == ONE_STREAM or size == VARIABLE:
         return (WHOLE,)
     return ranges_of(header.count, max(1, points_each // size) * size)
 
@@ -109,6 +110,7 @@ def read_header(file):
     else:
         require_library(file, "lazrs")
         _check_laszip(file, parts, laszip)
+        laszip = _with_chunk_size(laszip, parts.count)
         _check_chunk_table(file, parts, laszip)
     return LasHeader(
         parts.count,
@@ -272,9 +274,21 @@ def _check_laszip(file, parts, data):
     """Items of the record add up to a point, chunks have a size."""
     is_sound = len(data) >= 34
     if is_sound:
-        compressor, coder = struct.unpack_from("<HH", data)
+        compressor, coder, major, minor = struct.unpack_from("<HHBB", data)
         chunk, items = struct.unpack_from("<I", data, 12)[0], struct.unpack_from("<H", data, 32)[0]
-        is_sound = compressor in (1, 2, 3) and coder == 0 and chunk > 0
+        if compressor not in (ONE_STREAM, 2, 3) or coder != 0:
+            raise file.refusal(
+                message(
+                    "cloud_file_laz_kind",
+                    "compressed by LASzip {version} with compressor {compressor} and coder {coder};"
+                    " expected compressor 1, 2 or 3 and coder 0: decompress it to LAS with the"
+                    " program that wrote it, or is it damaged?",
+                    version=f"{major}.{minor}",
+                    compressor=compressor,
+                    coder=coder,
+                )
+            )
+        is_sound = chunk > 0 or compressor == ONE_STREAM
         is_sound = is_sound and items > 0 and len(data) >= 34 + 6 * items
     if is_sound:
         sizes = [struct.unpack_from("<H", data, 36 + 6 * i)[0] for i in range(items)]
@@ -289,6 +303,16 @@ def _check_laszip(file, parts, data):
         )
 
 
+def _with_chunk_size(data, count):
+    """The LASzip record for lazrs: one stream of points, as LASzip 1 writes it, has no chunk size.
+
+    LASzip 1.2 leaves 0 or the value for variable sizes there; lazrs takes any other number.
+    """
+    if _chunks_in(data)[0] != ONE_STREAM:
+        return data
+    return data[:12] + struct.pack("<I", min(max(count, 1), VARIABLE - 1)) + data[16:]
+
+
 def _chunks_in(data):
     """The compressor of a LASzip record, and the points of its chunks."""
     return struct.unpack_from("<H", data)[0], struct.unpack_from("<I", data, 12)[0]
@@ -297,7 +321,7 @@ def _chunks_in(data):
 def _check_chunk_table(file, parts, data):
     """The table lies in the file, and has as many chunks as points and bytes have room for."""
     compressor, size = _chunks_in(data)
-    if compressor == 1:  # one stream of points, no chunks
+    if compressor == ONE_STREAM:
         return
     with file.path.open("rb") as stream:
         stream.seek(parts.first)

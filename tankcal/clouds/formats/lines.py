@@ -124,6 +124,11 @@ def count_lines(block):
     return lines
 
 
+def count_rows(block):
+    """Lines of a block that are neither blank nor a comment."""
+    return sum(not _is_idle(line) for line in block.split(b"\n"))
+
+
 def skip_lines(lines, wanted):
     """Pass over so many lines with anything in them; how many there were."""
     done = 0

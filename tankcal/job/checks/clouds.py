@@ -45,6 +45,9 @@ def check_clouds(values, tables, registers, raw, log):
         tell_of = _teller(raw, file, name, log)
         if headers[name] is not None:
             _check_poses(one, headers[name], tell_of)
+            for scan in headers[name].scans:
+                if scan.warning is not None and one["pose"] is None:
+                    tell_of("pose", scan.warning, log.warning)
         _check_places(one, tell_of)
         _check_errors(one, [counts.get(scan, 0) for scan in names.get(name, ())], tables, tell_of)
     _refuse_unlike(raw, file, given, log)
@@ -148,6 +151,14 @@ def _check_poses(given, header, tell):
                 "pose_of_scans_missing",
                 'blank, but the file has {count} scans with a pose each; expected "file", or four'
                 " rows for each",
+                count=count,
+            )
+            tell("pose", text)
+        elif count > 1 and any(one.is_placed for one in header.scans):
+            text = message(
+                "pose_without_rotation",
+                "blank, but the {count} scans of the file have positions without a rotation (a"
+                " quaternion of zeros); expected four rows of four numbers for each scan",
                 count=count,
             )
             tell("pose", text)

@@ -1,7 +1,6 @@
 """A result of the camera's analyses on paper: its values in the words of its language."""
 
 import hashlib
-import json
 from pathlib import Path
 
 import tankcal
@@ -10,6 +9,7 @@ from tankcal.messages import message
 from tankcal.record.camera_versions import CAMERA
 from tankcal.report import blocks
 from tankcal.report.plain import Column, PlainPaper
+from tankcal.text.decoding import read_json
 from tankcal.text.digits import NOTHING
 from tankcal.text.languages import DEFAULT
 from tankcal.text.words import load_words
@@ -22,7 +22,7 @@ def load(path):
     """Read a camera.json of this version or an older one; raises InputError when it is none."""
     name = Path(path).name
     try:
-        result = json.loads(Path(path).read_text(encoding="utf-8"))
+        result = read_json(path)
     except (OSError, ValueError, RecursionError) as error:
         expected = message(
             "camera_result_unreadable", "cannot be read as a result: {error}", error=str(error)

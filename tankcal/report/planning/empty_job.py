@@ -1,7 +1,6 @@
 """The empty job of a plan: all that is known beforehand, with room for what will be measured."""
 
 import hashlib
-import json
 from math import degrees, isfinite
 
 from tankcal.errors import InputError, Problem
@@ -14,6 +13,7 @@ from tankcal.planning.measurements import targets_of
 from tankcal.planning.model import TAPED
 from tankcal.record.plan import PLAN
 from tankcal.record.wall_plan import WALL_PLAN
+from tankcal.text.decoding import read_json
 from tankcal.text.languages import DEFAULT
 
 ARCSEC = 3600.0
@@ -47,7 +47,7 @@ def refuse_filled(folder, plan_file):
     if not folder.exists():
         return
     try:
-        plan = json.loads(plan_file.read_text(encoding="utf-8"))
+        plan = read_json(plan_file)
     except (OSError, ValueError, RecursionError):
         written = None
     else:

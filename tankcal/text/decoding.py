@@ -1,0 +1,68 @@
+"""Text of a file of any program: the one place that determines its encoding.
+
+Editors and spreadsheets write UTF-8 with or without a byte order mark, and UTF-16 under the name
+"Unicode". Each of these is recognised from the first bytes.
+"""
+
+import codecs
+import json
+from pathlib import Path
+
+_MARKS = (  # UTF-32 before UTF-16, whose mark begins the mark of UTF-32
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+_MARK = "\ufeff"  # the byte order mark after decoding
+
+
+def find_encoding(data):
+    """Encoding of the bytes of a text: by the byte order mark, else by zeros in ASCII letters."""
+    for mark, name in _MARKS:
+        if data.startswith(mark):
+            return name
+    first, second, third, fourth = data[:4] if len(data) > 3 else b"    "
+    if second == fourth == 0 and first and third:
+        return "utf-16-le"
+    if first == third == 0 and second and fourth:
+        return "utf-16-be"
+    return "utf-8"
+
+
+def decode_text(data, encoding=None):
+    """Text of bytes without byte order marks at its start.
+
+    Parameters
+    ----------
+    data : bytes
+    encoding : str or None
+        Name of the encoding; None: as `find_encoding` determines it.
+
+    Raises
+    ------
+    UnicodeDecodeError
+        The bytes are not text of that encoding.
+
+    Examples
+    --------
+    >>> decode_text(b"\\xef\\xbb\\xbfa,b")
+    'a,b'
+    >>> decode_text("a,b".encode("utf-16"))
+    'a,b'
+    """
+    return data.decode(encoding or find_encoding(data)).lstrip(_MARK)
+
+
+def read_json(path):
+    """Content of a JSON file in UTF-8 or UTF-16, with or without a byte order mark.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    ValueError
+        The file is not JSON.
+    """
+    return json.loads(decode_text(Path(path).read_bytes()))
