@@ -50,6 +50,7 @@ _SIZES = {
         (r"yd3", 27 * FOOT3_M3),
     ),
 }
+MOST_LETTERS = 500  # of a heading: patterns are looked for in it from each letter on
 _GALLON = re.compile("gals?|gallons?|galao|galoes|galon|galones")
 _BARREL = re.compile("k?bbls?|bls|brls?|barrels?|barril|barris|barriles")
 _US = re.compile("us|american|americanos?|americanas?|estadounidenses?")
@@ -197,7 +198,9 @@ NO_UNIT = Unit()
 
 
 def plain_text(text):
-    """Lower case, without accents, superscripts as digits, ½ as 1/2."""
+    """Lower case, without accents, superscripts as digits, ½ as 1/2; "" for no heading's length."""
+    if len(text) > MOST_LETTERS:
+        return ""
     text = re.sub("10([⁰¹²³⁴⁵⁶⁷⁸⁹]+)", lambda power: "10^" + power[1].translate(_POWERS), text)
     text = re.sub("([¼-¾⅐-⅞])", r" \1", text)
     decomposed = unicodedata.normalize("NFKD", text).replace("\u2044", "/")
