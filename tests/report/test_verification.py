@@ -351,6 +351,7 @@ def change_record(folder, change):
     record = json.loads(path.read_text(encoding="utf-8"))
     change(record)
     path.write_text(json.dumps(record), encoding="utf-8")
+    write_sums_again(folder)  # else no command takes the record
 
 
 def test_a_number_that_does_not_come_out_again_is_told_of(job):
