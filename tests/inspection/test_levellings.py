@@ -229,6 +229,7 @@ def test_what_is_no_table_is_told(tmp_path, whole):
         assert read(tmp_path, whole, reader)[1]
 
 
+@pytest.mark.slow
 def test_spoilt_files_are_told_or_computed(tmp_path):
     rng = np.random.default_rng(99)
     for _ in range(150):

@@ -112,6 +112,7 @@ WIDE = Strength(diameter_m=60.0, height_m=14.6, yield_pa=250e6, e_pa=206e9)
 PLANTED = {1: (40.0, 1.0), 2: (50.0, 0.4), 3: (14.0, 2.0), 4: (4.0, 5.0)}
 
 
+@pytest.mark.slow
 def test_readings_of_a_dense_levelling_are_beyond_the_limit(figure):
     """Truth: curvature of the planted waves, by a fine grid. 100 levellings with s = 1.5 mm.
 

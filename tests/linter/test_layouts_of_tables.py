@@ -267,6 +267,7 @@ def test_summaries_of_several_columns_of_volumes_name_them(tmp_path):
 # the last row
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize("step_m", [0.1, 0.01, 0.001])
 @pytest.mark.parametrize("part", [0.04, 0.3, 0.5])
 @pytest.mark.parametrize("shape", ["upright", "lying", "sphere"])

@@ -232,7 +232,7 @@ def test_intervals_hold_on_independent_shells(tmp_path, figure, method):
 @pytest.mark.study
 @pytest.mark.parametrize("method", SURVEYS)
 def test_intervals_hold_on_independent_shells_study(tmp_path, figure, method):
-    shells = draws(30, FULL)
+    shells = draws(10, FULL)
     each = study(method, shells, tmp_path, figure)
     assert all(one.found is not None for one in each)
     assert not any(one.is_silent for one in each)

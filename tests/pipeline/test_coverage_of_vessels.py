@@ -43,6 +43,7 @@ def test_true_volumes_of_an_elliptical_tank():
     assert tank.volumes(dips) == pytest.approx(expected, abs=3e-6 * expected[-1])  # chords
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_true_volumes_of_a_lying_tank(seed):
     """Second methods: r^2 / 2 over all turns; horizontal strips between the walls of a slice."""
@@ -76,6 +77,7 @@ def _strips(x, z, level):
     return np.abs(sides[0] - sides[1]).mean() * (level - z[bottom])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", BALLS)
 def test_true_volume_of_a_ball(family):
     """Second method: r^3 / 3 over Gauss places of the height and even turns."""
@@ -157,7 +159,7 @@ def test_intervals_hold_on_vessels(base_job, figure):  # noqa: F811
 @pytest.mark.study
 @pytest.mark.parametrize("shares", [(0.2, 0.8), (0.1, 0.5, 0.9)])
 def test_intervals_hold_on_rings_of_vessels_study(base_job, figure, shares):  # noqa: F811
-    count = draws(30, 200)
+    count = draws(12, 200)
     found = [errors_of_ring(seed, base_job, shares) for seed in range(count)]
     held, wide = judge(found, f"welded rings, {len(shares)} straps", figure)
     assert held > least(count)
@@ -167,6 +169,6 @@ def test_intervals_hold_on_rings_of_vessels_study(base_job, figure, shares):  # 
 @pytest.mark.study
 @pytest.mark.parametrize("family", BALLS)
 def test_intervals_hold_on_spheres_of_vessels_study(figure, family):
-    count = draws(10, 200)
+    count = draws(6, 200)
     found = [errors_of_ball(seed, family) for seed in range(count)]
     assert judge(found, f"spheres, {family}", figure)[0] > least(count)

@@ -553,7 +553,7 @@ def arc_parts(setups=4, seed=None, wide=1.7, control=True):
     return parts
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("control", [True, False])
 def test_set_ups_that_the_wall_alone_ties(tmp_path, control):
     result = run(tmp_path, arc_parts(control=control))

@@ -172,6 +172,7 @@ def drawn_job(seed, folder, factor=1.0, noises=(0.0003, 0.001, 0.002, 0.004, 0.0
     return job_of(wall, measured, folder, given=bool(rng.random() < 0.8))
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("seed", [5019, 5196, 5319], ids=["buckle", "coil", "buckle of 0.3 mm"])
 def test_form_that_the_model_lacks_is_no_noise(seed, tmp_path):
     """A buckle in one course is far from the form of the others; the noise is 0.3 or 1 mm."""
@@ -198,7 +199,7 @@ def test_form_of_valid_walls_is_no_noise(tmp_path, figure):
 
 @pytest.mark.study
 def test_form_of_valid_walls_is_no_noise_study(tmp_path, figure):
-    count = draws(600, 2000)
+    count = draws(200, 2000)
     share = share_accused(count, tmp_path)
     figure(f"valid surveys whose sections are called unequal, of {count}", f"{share:.4f}")
     assert share <= SHARE_ACCUSED

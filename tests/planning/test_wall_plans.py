@@ -637,7 +637,7 @@ def test_field_sheets_tell_of_the_other_face_where_it_is_read(tmp_path, faces, t
     assert "Hits" not in str([block.data for block in wall_outlook(paper)])
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("language", ["en", "pt-BR", "es"])
 def test_names_of_bars_are_on_the_picture(language):
     """Also that of a change with a long name: matplotlib says how wide it is drawn."""

@@ -123,6 +123,7 @@ def test_rows_that_were_all_computed_are_all_read(tmp_path):
     assert "read_proportional_parts" not in codes(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("density", [860.6, 0.0])
 def test_a_declared_density_holds_where_courses_bulge(tmp_path, density):
     table = table_of(tank(density_kg_m3=density, bulge_m=0.004))
