@@ -108,11 +108,23 @@ def _demo(options):
     _compute(None, shipped_folder("examples") / "silva-1995", Path(options.out), options.quiet)
 
 
-def _tell(out, paths, warnings, result, adjustment):
-    """Warnings, a summary and the files, for a person; what is implausible comes last of all."""
+def _print_doubts_of_job(job, show, tell):
+    """The implausible inputs, before the time is spent that computing with them takes."""
+    doubts = _doubts_among(job.warnings)
+    if doubts and tell is _tell:
+        show.end()
+        print_doubts(doubts)
+
+
+def _doubts_among(warnings):
     from tankcal.job.plausibility_table import CODES
 
-    doubts = [one for one in warnings if getattr(one.expected, "code", None) in CODES]
+    return [one for one in warnings if getattr(one.expected, "code", None) in CODES]
+
+
+def _tell(out, paths, warnings, result, adjustment):
+    """Warnings, a summary and the files, for a person; implausible inputs once more at the end."""
+    doubts = _doubts_among(warnings)
     warn(one for one in warnings if one not in doubts)
     if adjustment is not None:
         say(_summary(adjustment))
@@ -168,6 +180,7 @@ def _compute(cluster, source, out, quiet, strict=False, papers=(), tell=_tell):
     from tankcal.report import outputs
 
     outputs.refuse_foreign(out)
+    _print_doubts_of_job(job, show, tell)
     result = tankcal.run(job, show.step, part_progress=show.part, cluster=cluster)
     adjustment = result.adjustment
     if strict:
@@ -232,6 +245,7 @@ def _adjust(cluster, source, out, quiet, strict, papers, tell=_tell):
     from tankcal.report import outputs
 
     outputs.refuse_foreign(out)
+    _print_doubts_of_job(job, show, tell)
     adjustment = tankcal.adjust_job(job, show.step)
     if strict:
         _refuse_failed(adjustment)

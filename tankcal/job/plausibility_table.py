@@ -145,9 +145,9 @@ TABLE = (
         "horizontal.thickness_mm, sphere.thickness_mm",
         f"lying {_line('horizontal')}; sphere {_line('sphere')}; below {limits.LEAST_PLATE_MM:g} mm"
         " a problem",
-        "ten times too thick, centimetres",
+        "ten times too thick or too thin, centimetres",
         "the diameter",
-        ("solid_plate_strange", "solid_plate_tiny"),
+        ("solid_plate_thick", "solid_plate_thin", "solid_plate_tiny"),
     ),
     Plausible(
         "datum.bottom_z_m",

@@ -387,6 +387,18 @@ def test_tank_without_uncertainty_is_reported(tmp_path, capsys):
     assert "U = 0" not in said
 
 
+def test_implausible_inputs_are_told_before_the_time_is_spent_on_them(tmp_path, capsys):
+    """And once more at the end, where nobody misses them."""
+    write_job(tmp_path / "job", kind="sphere", settings={"sphere.diameter_m": 70.0})
+    assert main(["run", str(tmp_path / "job"), "--no-papers"]) == 0
+    said = capsys.readouterr().err.splitlines()
+    about = [n for n, line in enumerate(said) if "sphere.diameter_m" in line]
+    assert len(about) == 2
+    assert "DOUBTFUL INPUT" in said[about[0] - 1]
+    assert about[0] < said.index("tankcal: integrating volumes") < about[1] == len(said) - 1
+
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("cluster", "told"), [("2", 1), ("local", 1), ("auto", 0), ("0", 0)])
 def test_workers_without_clouds_are_told(cluster, told, tmp_path, capsys):

@@ -6,7 +6,7 @@
 from tankcal.gum.monte_carlo.goal import NAMES as ESTIMATES
 from tankcal.gum.monte_carlo.goal import Goal, Simulation, Verdict, numerical_tolerance, verdict
 from tankcal.gum.monte_carlo.quadratic import QuadraticRows
-from tankcal.gum.monte_carlo.simulation import simulate
+from tankcal.gum.monte_carlo.simulation import simulate, simulate_quadratic
 
 __all__ = [
     "ESTIMATES",
@@ -16,5 +16,6 @@ __all__ = [
     "Verdict",
     "numerical_tolerance",
     "simulate",
+    "simulate_quadratic",
     "verdict",
 ]

@@ -53,28 +53,43 @@ def simulate(model, inputs, correlation=None, *, goal=None, sensitivities=None, 
         For what cannot be a correlation or has other shapes.
     """
     goal = goal or Goal()
-    ready = inputs_of(inputs, correlation)
     progress = progress or (lambda text, done, total: None)
-    if not isinstance(model, QuadraticRows):
-        control = None
-        if ready.transform is not None:
-            slopes = differences(model, ready) if sensitivities is None else sensitivities
-            control = control_of(np.asarray(slopes, dtype=float), ready, goal)
-        return simulation(goal, *simulate_in_batches(model, ready, control, goal, progress))
-    if model.jacobian.shape[1] != len(ready.mean):
-        raise ValueError(
-            f"{len(ready.mean)} inputs, {model.jacobian.shape[1]} columns of the model"
-        )
+    if isinstance(model, QuadraticRows):
+        return simulate_quadratic(model, inputs, correlation, goal=goal, progress=progress)[0]
+    ready = inputs_of(inputs, correlation)
+    control = None
+    if ready.transform is not None:
+        slopes = differences(model, ready) if sensitivities is None else sensitivities
+        control = control_of(np.asarray(slopes, dtype=float), ready, goal)
+    return simulation(goal, *simulate_in_batches(model, ready, control, goal, progress))
+
+
+def simulate_quadratic(rows, inputs, correlation=None, *, goal, progress, choose=None):
+    """The `Simulation` of quadratic rows, and the places of its rows among them.
+
+    choose  choose(places) -> those of the rows at these places that plain draws are spent on, a
+            second each: few points do not determine their intervals. All by default; the rows
+            that are not chosen are left out
+    Raises ValueError as `simulate`.
+    """
+    ready = inputs_of(inputs, correlation)
+    if rows.jacobian.shape[1] != len(ready.mean):
+        raise ValueError(f"{len(ready.mean)} inputs, {rows.jacobian.shape[1]} columns of the model")
     if ready.transform is None or not _symmetric(ready):
-        return simulation(goal, *simulate_in_batches(model, ready, None, goal, progress))
-    estimates, errors, draws, controlled, sound = table_estimates(model, ready, goal, progress)
+        found = simulate_in_batches(rows, ready, None, goal, progress)
+        return simulation(goal, *found), np.arange(len(rows.value))
+    estimates, errors, draws, controlled, sound = table_estimates(rows, ready, goal, progress)
     hard = np.flatnonzero(~sound)
+    if choose is not None:
+        hard = choose(hard)
     if len(hard):
-        part = model.subset(hard)
+        part = rows.subset(hard)
         control = control_of(part.jacobian, ready, goal)
         found = simulate_in_batches(part, ready, control, goal, progress)
         estimates[:, hard], errors[:, hard], draws[hard], controlled[hard] = found
-    return simulation(goal, estimates, errors, draws, controlled)
+    kept = np.union1d(np.flatnonzero(sound), hard)
+    found = (estimates[:, kept], errors[:, kept], draws[kept], controlled[kept])
+    return simulation(goal, *found), kept
 
 
 def differences(model, ready):

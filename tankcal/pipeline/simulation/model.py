@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.gum.distributions import standard
-from tankcal.gum.monte_carlo import ESTIMATES, QuadraticRows, numerical_tolerance, simulate
+from tankcal.gum.monte_carlo import ESTIMATES, QuadraticRows, numerical_tolerance, simulate_quadratic
 from tankcal.pipeline.simulation.bent import bent_rows, datum_law, simulate_bent
 from tankcal.pipeline.simulation.curvature import curvature
 
@@ -70,7 +70,10 @@ def _distribution(source):
 
 UNFELT = 1e-4  # of u of a volume: an input that adds less is not drawn for it
 COUNTED = ("reached", "controlled", "draws", "tolerance")  # of a row that was drawn for
-MOST_ROWS, MOST_BENT = 800, 60  # that are drawn for; of longer tables others follow neighbours
+
+# rows that are drawn for, in all, of bent ones, and of those that take plain draws; of longer
+# tables the others follow their neighbours
+MOST_ROWS, MOST_BENT, MOST_PLAIN = 800, 60, 16
 
 
 class Model:
@@ -94,18 +97,17 @@ class Model:
         self.some_even = self._thinned(np.flatnonzero(~self.bent), MOST_ROWS)
         self.some_bent = self._thinned(np.flatnonzero(self.bent), MOST_BENT)
 
-    @property
-    def drawn(self):
-        """How many rows are drawn for."""
-        places = (self.some_even, self.some_bent)
-        return sum(int(np.count_nonzero(one < self.rows)) for one in places)
-
     def simulated(self, goal, progress):
-        """`monte_carlo.Simulation` of all volumes."""
+        """`monte_carlo.Simulation` of all volumes, and how many rows were drawn for."""
         even, bent = self.some_even, self.some_bent
-        found = simulate(
-            self.quadratic.subset(even), self.inputs.distributions, goal=goal, progress=progress
+        found, kept = simulate_quadratic(
+            self.quadratic.subset(even),
+            self.inputs.distributions,
+            goal=goal,
+            progress=progress or (lambda text, done, total: None),
+            choose=lambda hard: np.searchsorted(even, self._thinned(even[hard], MOST_PLAIN)),
         )
+        even = even[kept]
         if len(bent):
             found = _merged(found, even, self._of_bent(bent, goal), bent)
         places = np.sort(np.concatenate([even, bent]))
@@ -113,7 +115,8 @@ class Model:
         full = spread_to_all(found, places, self.quadratic.value, u, goal.digits)
         endless = [not np.isfinite(one.sd) for one in self.inputs.distributions]
         without_u = np.any(self.inputs.slopes[:, endless] != 0, axis=1)
-        return replace(full, u=np.where(without_u, np.inf, full.u))
+        full = replace(full, u=np.where(without_u, np.inf, full.u))
+        return full, int(np.count_nonzero(places < self.rows))
 
     def _both(self, of_rows):
         """Values of the rows, then those of the deliveries."""

@@ -62,7 +62,7 @@ def simulate_table(job, survey, body, zero_m, table, pairs=(), *, goal=None, pro
     shown = progress and (lambda text, done, total: progress(SIMULATING, done, total))
     low, high = np.array(pairs, dtype=float).reshape(-1, 2).T
     model = Model(job, survey, body, zero_m, table, table.weights(high) - table.weights(low))
-    found = model.simulated(goal, shown)
+    found, drawn = model.simulated(goal, shown)
     rows, others = (_part(found, part) for part in model.parts)
     delivered = deliveries(table, low, high)
     of_delivered = delivered.volume_m3, delivered.u_m3, delivered.dof
@@ -74,7 +74,7 @@ def simulate_table(job, survey, body, zero_m, table, pairs=(), *, goal=None, pro
         smooth=~model.bent[model.parts[1]],
         curved=model.curved.pairs,
         bent=model.bent[model.parts[0]],
-        drawn=model.drawn,
+        drawn=drawn,
         seed=goal.seed,
         digits=goal.digits,
     )

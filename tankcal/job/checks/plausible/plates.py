@@ -121,14 +121,24 @@ def _check_solid(values, kind, raw, log):
     if diameter is None or values["checks"]["shell"] == "other":
         return
     least, most = (a + b * diameter for a, b in SOLID_PLATES_MM[kind])
-    if not least <= plate <= most:
+    if plate > most:
         text = message(
-            "solid_plate_strange",
+            "solid_plate_thick",
             "{found_mm:g} mm, expected {least_mm:.3g} to {most_mm:.3g} mm for a diameter of"
-            " {diameter_m:g} m: is it ten times too thick, or in centimetres?",
-            found_mm=plate,
-            least_mm=least,
-            most_mm=most,
-            diameter_m=diameter,
+            " {diameter_m:g} m: two or ten times too thick, or with the insulation?",
+            **_of_solid(plate, least, most, diameter),
         )
-        tell(log.warning, raw, kind, "thickness_mm", text)
+    elif plate < least:
+        text = message(
+            "solid_plate_thin",
+            "{found_mm:g} mm, expected {least_mm:.3g} to {most_mm:.3g} mm for a diameter of"
+            " {diameter_m:g} m: ten times too thin, or in centimetres?",
+            **_of_solid(plate, least, most, diameter),
+        )
+    else:
+        return
+    tell(log.warning, raw, kind, "thickness_mm", text)
+
+
+def _of_solid(plate, least, most, diameter):
+    return {"found_mm": plate, "least_mm": least, "most_mm": most, "diameter_m": diameter}
