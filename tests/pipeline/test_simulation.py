@@ -396,7 +396,7 @@ def test_rows_that_take_plain_draws_are_bounded_in_number(monkeypatch, tmp_path,
     some = simulated(result, plain_draws=100_000)
     monkeypatch.setattr("tankcal.pipeline.simulation.model.MOST_PLAIN", 10**6)
     every = simulated(result, plain_draws=100_000)
-    assert every.drawn - some.drawn > 16
+    assert every.drawn > some.drawn + 5
     off = 0.0
     for name in ("low", "high"):
         parts = (getattr(some.found, name) - getattr(every.found, name))[1:]

@@ -5,7 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.gum.distributions import standard
-from tankcal.gum.monte_carlo import ESTIMATES, QuadraticRows, numerical_tolerance, simulate_quadratic
+from tankcal.gum.monte_carlo import (
+    ESTIMATES,
+    QuadraticRows,
+    numerical_tolerance,
+    simulate_quadratic,
+)
 from tankcal.pipeline.simulation.bent import bent_rows, datum_law, simulate_bent
 from tankcal.pipeline.simulation.curvature import curvature
 
