@@ -4,7 +4,6 @@ A table that has only headings, as `tankcal new` writes it, is filled in; one wi
 it is, and the import refused, unless it is to be replaced.
 """
 
-import csv
 import io
 import os
 import shutil
@@ -16,6 +15,7 @@ from tankcal.fieldbooks.rows import CONTRACT, columns_of
 from tankcal.job.folder import csv_marks, read_toml
 from tankcal.job.tables import SETTINGS_FILE, Log, read_bytes
 from tankcal.messages import message
+from tankcal.text.spreadsheets import write_guarded
 
 
 def write_tables(folder, tables, *, replace):
@@ -77,8 +77,7 @@ def _comments(path):
 def _text(name, rows, separator, decimal):
     columns, stream = columns_of(name, rows), io.StringIO()
     numbers = {field.name for field in CONTRACT[name] if field.kind == "number"}
-    writer = csv.writer(stream, delimiter=separator, lineterminator="\n")
-    writer.writerow(columns)
+    written = [columns]
     for row in rows:
         cells = [row.cells.get(one, "") for one in columns]
         if decimal == ",":
@@ -86,7 +85,8 @@ def _text(name, rows, separator, decimal):
                 cell.replace(".", ",") if column in numbers else cell
                 for column, cell in zip(columns, cells, strict=True)
             ]
-        writer.writerow(cells)
+        written.append(cells)
+    write_guarded(stream, written, separator)
     return stream.getvalue()
 
 

@@ -1,9 +1,10 @@
 """The files of a job, written from its parts."""
 
-import csv
 import io
 import json
 from datetime import date
+
+from tankcal.text.spreadsheets import write_guarded
 
 
 def job_files(parts):
@@ -21,7 +22,7 @@ def job_files(parts):
 def csv_text(rows, separator=","):
     """Rows as CSV."""
     stream = io.StringIO()
-    csv.writer(stream, delimiter=separator, lineterminator="\n").writerows(rows)
+    write_guarded(stream, rows, separator)
     return stream.getvalue()
 
 

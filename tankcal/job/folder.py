@@ -25,6 +25,7 @@ from tankcal.job.tables import (
 )
 from tankcal.messages import message
 from tankcal.text.decoding import decode_text
+from tankcal.text.spreadsheets import unguard_formula
 
 MAX_SETTINGS_BYTES = 1_000_000
 MAX_SETTINGS_LINE = 4000  # characters
@@ -404,14 +405,12 @@ def _csv_rows(file, text, separator, log):
     for number, line in enumerate(_lines(text), 1):
         if not is_row(line):
             continue
-        if '"' not in line:
+        if '"' not in line and "'" not in line:
             yield number, line.split(separator)
             continue
         try:
-            yield (
-                number,
-                next(csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True)),
-            )
+            reader = csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True)
+            yield number, [unguard_formula(cell.strip()) for cell in next(reader)]
         except csv.Error:
             log.problem(
                 file,

@@ -8,6 +8,7 @@ import re
 from dataclasses import dataclass, replace
 
 from tankcal.job.folder import is_row, separator_of_blank
+from tankcal.text.spreadsheets import guard_formula, unguard_formula
 from tankcal.workbench.decimals import Unwritten
 
 _ENDING = re.compile("\r\n|\r|\n")
@@ -194,7 +195,7 @@ class CsvLines:
     def _quoted(self, text):
         if isinstance(text, Unwritten):
             return ""
-        text = _ENDING.sub(" ", text).strip()
+        text = guard_formula(_ENDING.sub(" ", text).strip())
         if self.separator not in text and '"' not in text:
             return text
         return '"' + text.replace('"', '""') + '"'
@@ -272,5 +273,5 @@ def cell_of(part):
     """
     plain = part.strip()
     if not plain.startswith('"'):
-        return plain
-    return plain[1:].removesuffix('"').replace('""', '"').strip()
+        return unguard_formula(plain)
+    return unguard_formula(plain[1:].removesuffix('"').replace('""', '"').strip())

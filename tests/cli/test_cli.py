@@ -398,7 +398,6 @@ def test_implausible_inputs_are_told_before_the_time_is_spent_on_them(tmp_path, 
     assert about[0] < said.index("tankcal: integrating volumes") < about[1] == len(said) - 1
 
 
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("cluster", "told"), [("2", 1), ("local", 1), ("auto", 0), ("0", 0)])
 def test_workers_without_clouds_are_told(cluster, told, tmp_path, capsys):

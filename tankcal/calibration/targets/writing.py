@@ -1,6 +1,5 @@
 """image_points.csv and the list of what was refused, both or none."""
 
-import csv
 import io
 import os
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ import numpy as np
 from tankcal.calibration.targets.found import REASONS
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.text.spreadsheets import write_guarded
 
 HEADINGS = ("photo", "point", "column_px", "line_px", "s_px")
 REFUSED_HEADINGS = ("photo", "code", "id", "column_px", "line_px", "detail", "reason")
@@ -135,7 +135,5 @@ def _refused_row(photo, one):
 def _text(headings, rows):
     """CSV; a comma within a cell is quoted, a line break cannot be there."""
     stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(headings)
-    writer.writerows(rows)
+    write_guarded(stream, [headings, *rows])
     return stream.getvalue()

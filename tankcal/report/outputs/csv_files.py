@@ -8,8 +8,8 @@ import numpy as np
 
 from tankcal.record.columns import ArrayColumns, Texts, values_of
 from tankcal.report import numbers
+from tankcal.text.spreadsheets import guard_formula
 
-FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 BLOCK = 10_000  # rows whose cells are texts at one time
 _YES = {True: "yes", False: "no"}
 
@@ -67,21 +67,15 @@ def _spread(heading, cells):
 
 
 def write_rows(rows, path):
-    """Write rows (dicts with the same keys) with twelve digits, lists with blanks between.
-
-    A text that a spreadsheet would take for a formula gets an apostrophe before it.
-    """
-    columns = {key: [_safe(row[key]) for row in rows] for key in rows[0]}
+    """Write rows (dicts with the same keys) with twelve digits, lists with blanks between."""
+    columns = {key: [_plain_cell(row[key]) for row in rows] for key in rows[0]}
     write_csv(columns, path, "%.12g")
 
 
-def _safe(value):
+def _plain_cell(value):
     if isinstance(value, bool):
         return _YES[value]
-    if isinstance(value, list):
-        value = " ".join(map(str, value))
-    is_formula = isinstance(value, str) and value.startswith(FORMULA_SIGNS)
-    return f"'{value}" if is_formula else value
+    return " ".join(map(str, value)) if isinstance(value, list) else value
 
 
 def write_csv(columns, path, style):
@@ -125,9 +119,10 @@ def _text(value, style):
 
 
 def _quoted(text):
-    """A text as a cell, in quotation marks where it must."""
+    """A text as a cell, in quotation marks where it must, never a formula."""
     if text.isalnum():
         return text
+    text = guard_formula(text)
     line = io.StringIO()
     csv.writer(line, lineterminator="\n").writerow((text, ""))
     return line.getvalue().removesuffix(",\n")

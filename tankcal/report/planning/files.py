@@ -1,10 +1,9 @@
 """A prediction for programs: plan.json, and CSV files with the units in their headings."""
 
-import csv
-
 from tankcal.record import save
 from tankcal.record.plan import plain_of
 from tankcal.report.planning.rows import place_of_change
+from tankcal.text.spreadsheets import write_guarded
 
 PLACE = ("arc_m", "off_m", "height_m")  # of what a change adds
 
@@ -77,6 +76,4 @@ def _mm(metres):
 
 def _write(path, headings, rows):
     with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(headings.split())
-        writer.writerows(rows)
+        write_guarded(file, [headings.split(), *rows])
