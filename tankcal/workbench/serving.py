@@ -68,9 +68,10 @@ def serve_app(notebook, port, address=HERE, is_browser=True, token=""):
     ]
     headers = {"Content-Security-Policy": POLICY}
     left = {"cull_idle_timeout": LEFT_S, "cull_interval": LOOK_S, "cull_connected": False}
-    settings = Config(
-        {"Voila": {"tornado_settings": {"headers": headers}}, "MappingKernelManager": left}
-    )
+    # On an address of this machine alone there is no token. A page of another host whose name is
+    # made to point here must not get in: only "localhost" and 127.0.0.1 are answered there.
+    tornado = {"headers": headers, "allow_remote_access": not is_local(address)}
+    settings = Config({"Voila": {"tornado_settings": tornado}, "MappingKernelManager": left})
     Voila.launch_instance(given, config=settings)
 
 

@@ -1,5 +1,6 @@
 """The notebook as a person uses it: Voilà and JupyterLab in a headless Chromium."""
 
+import http.client
 import json
 import os
 import re
@@ -82,6 +83,23 @@ def folder(tmp_path_factory):
     for path in folder.glob("*.csv"):
         path.write_text(path.read_text().replace(",", ";").replace(".", ","))
     return folder
+
+
+def test_app_answers_no_other_host(folder):
+    """A page of another host, whose name was made to point to 127.0.0.1, starts no kernel."""
+    if not serving.has_app():
+        pytest.skip("no Voilà here (tankcal[app]): the app is not reached")
+    with served("tankcal", "app", str(folder), "--no-browser") as url:
+        reach(url)
+        host, port = re.search(r"//([\d.]+):(\d+)", url).groups()
+        statuses = {}
+        for name in ("evil.example", f"evil.example:{port}", "192.168.0.7", f"localhost:{port}"):
+            connection = http.client.HTTPConnection(host, int(port), timeout=SLOW_S)
+            connection.request("GET", "/", headers={"Host": name})
+            statuses[name] = connection.getresponse().status
+            connection.close()
+        assert statuses.pop(f"localhost:{port}") == 200
+        assert set(statuses.values()) == {403}
 
 
 def test_app_edits_checks_runs_and_saves(folder):
