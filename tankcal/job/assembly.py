@@ -38,7 +38,7 @@ from tankcal.job.model import (
     Top,
 )
 from tankcal.job.strapping import gauged
-from tankcal.job.tables import fingerprint, read_bytes
+from tankcal.job.tables import fingerprint, read_beside
 from tankcal.messages import message
 from tankcal.tank.rules.model import Rule
 
@@ -87,7 +87,7 @@ def read_mesh_file(folder, name, log):
             ),
         )
         return None
-    data = read_bytes(path, log, MAX_MESH_BYTES)
+    data = read_beside(folder, name, log, MAX_MESH_BYTES)
     if data is None:
         return None
     if not data.strip():

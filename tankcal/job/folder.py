@@ -20,7 +20,7 @@ from tankcal.job.tables import (
     fingerprint,
     make_table,
     nearest,
-    read_bytes,
+    read_beside,
     shown,
 )
 from tankcal.messages import message
@@ -49,7 +49,7 @@ def read_folder(folder, log, edited=None):
     files = []
 
     def content(name, limit=MAX_FILE_BYTES):
-        data = edited[name] if name in edited else read_bytes(folder / name, log, limit)
+        data = edited[name] if name in edited else read_beside(folder, name, log, limit)
         if data is not None:
             files.append(fingerprint(name, data))
         return data

@@ -13,7 +13,7 @@ from tankcal.job.contract.shorthand import choice, positive
 from tankcal.job.entries import read_section
 from tankcal.job.fields import Field, is_blank
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
-from tankcal.job.tables import Log, fingerprint, nearest, read_bytes
+from tankcal.job.tables import Log, fingerprint, nearest, read_beside, read_bytes
 from tankcal.messages import message
 from tankcal.tank.rules.model import (
     DEVIATION_OF,
@@ -141,7 +141,7 @@ def find_rule(raw, name, log):
         missing = message("no_rule_file", "no such file beside the job")
         _tell_unknown(*place, name, missing, rules_of_one_table(), log)
         return None
-    data = read_bytes(path, log, MAX_SETTINGS_BYTES)
+    data = read_beside(raw.folder, name, log, MAX_SETTINGS_BYTES)
     rule = None if data is None else parse_rule(name, data, log)
     return None if rule is None else _of_one_table(rule, fingerprint(name, data), place, log)
 

@@ -7,6 +7,7 @@ is wrong to a `Log`, so that all problems of a job come in one run.
 
 import difflib
 import hashlib
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -269,6 +270,25 @@ def read_bytes(path, log, limit=MAX_FILE_BYTES):
     except (OSError, ValueError) as error:
         log.problem(path.name, unreadable_file(error))
     return None
+
+
+def read_beside(folder, name, log, limit=MAX_FILE_BYTES):
+    """The bytes of a file of a job, or None after telling `log`; no link leads out of its folder.
+
+    A job may come from somebody else: what a link points to is no part of it, and lines of it
+    would be printed where they are no table.
+    """
+    path = folder / name
+    with suppress(OSError, ValueError, RuntimeError):  # read_bytes tells of these
+        if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
+            expected = message(
+                "link_out_of_job",
+                "a symbolic link to a place outside the folder; expected the file itself: copy it "
+                "into the folder",
+            )
+            log.problem(name, expected)
+            return None
+    return read_bytes(path, log, limit)
 
 
 def unreadable_file(error):

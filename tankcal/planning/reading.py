@@ -41,7 +41,7 @@ from tankcal.job.tables import (
     fingerprint,
     meant,
     nearest,
-    read_bytes,
+    read_beside,
 )
 from tankcal.job.tables import TABLES as JOB_FILES
 from tankcal.messages import message
@@ -183,7 +183,7 @@ def _read(folder, log):
     files = []
 
     def content(name, limit=None):
-        data = read_bytes(folder / name, log, *([] if limit is None else [limit]))
+        data = read_beside(folder, name, log, *([] if limit is None else [limit]))
         if data is not None:
             files.append(fingerprint(name, data))
         return data

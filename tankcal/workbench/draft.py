@@ -16,7 +16,15 @@ from tankcal.errors import InputError, Problem
 from tankcal.job.contract import COLUMNS, KINDS, columns_of
 from tankcal.job.folder import csv_marks, decode, parsed_toml, read_toml
 from tankcal.job.loading import load_edited
-from tankcal.job.tables import REGISTERS, SETTINGS_FILE, TABLES, Log, meant, read_bytes
+from tankcal.job.tables import (
+    REGISTERS,
+    SETTINGS_FILE,
+    TABLES,
+    Log,
+    meant,
+    read_beside,
+    read_bytes,
+)
 from tankcal.messages import message
 from tankcal.text.decoding import decode_text, find_encoding
 from tankcal.workbench.book import new_sheet_table, read_book, written_book
@@ -101,7 +109,7 @@ class Draft:
     def _content(self, name):
         """The bytes of a file, None where it is not there or cannot be read (the check tells)."""
         path = self.source if self.is_book else self.source / name
-        data = read_bytes(path, Log()) if path.exists() else None
+        data = read_beside(path.parent, path.name, Log()) if path.exists() else None
         self._disk[name] = data
         return data
 

@@ -152,8 +152,9 @@ def test_saving_is_all_or_nothing(folder, monkeypatch):
     assert draft.is_changed
 
 
-def test_permissions_and_links_stay(folder, tmp_path):
-    kept = tmp_path / "kept.csv"
+def test_permissions_and_links_stay(folder):
+    kept = folder / "kept" / "courses.csv"
+    kept.parent.mkdir()
     shutil.move(folder / "courses.csv", kept)
     kept.chmod(0o640)
     (folder / "courses.csv").symlink_to(kept)
