@@ -28,7 +28,7 @@ from tankcal.cli import (
 from tankcal.cli.help_words import argparse_in, put_in_words
 from tankcal.cli.machine import failure, print_json
 from tankcal.cli.showing import complain, speak, words_of_run
-from tankcal.cli.stopping import ended_by_signals, stopped_status
+from tankcal.cli.stopping import ended_by_signals, is_of_memory, stopped_status
 from tankcal.errors import TankcalError
 from tankcal.messages import message, printable, printable_lines
 
@@ -70,6 +70,7 @@ the job format: docs/job-format.md; axes, signs and units: docs/conventions.md""
 
 def main(arguments=None):
     """Run the command line; returns the exit status."""
+    _print_in_any_encoding()
     speak()
     with argparse_in(words_of_run()):
         options = _options(arguments)
@@ -89,16 +90,40 @@ def main(arguments=None):
     except BrokenPipeError:  # the reader of our output went away: nothing to say to nobody
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except OSError as error:
+    except BaseException as error:
+        return _status_of(error)
+
+
+def _status_of(error):
+    """Exit status of a command that was ended, or failed by its machine, after a line about it.
+
+    Raises everything else again.
+    """
+    status = stopped_status(error)
+    if status is not None:
+        complain(message("stopped", "stopped; results are as they were, or whole new ones"))
+        return status
+    if is_of_memory(error):
+        complain(
+            message(
+                "out_of_memory",
+                "not enough memory; earlier results are as they were. Close other programs, raise "
+                "the limit of memory, or compute on a larger machine",
+            )
+        )
+        return 2
+    if isinstance(error, OSError):
         name = printable(error.filename or "system")
         print(f"tankcal: {name}: {printable(error.strerror or error)}", file=sys.stderr)
         return 2
-    except BaseException as error:
-        status = stopped_status(error)
-        if status is None:
-            raise
-        complain(message("stopped", "stopped; results are as they were, or whole new ones"))
-        return status
+    raise error
+
+
+def _print_in_any_encoding():
+    """Spell out the letters that the terminal or file lacks: cp1252 on Windows, ASCII."""
+    for stream in (sys.stdout, sys.stderr):
+        if getattr(stream, "errors", None) == "strict":
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _options(arguments):

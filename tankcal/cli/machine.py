@@ -1,5 +1,6 @@
 """What `--json` prints: one JSON object on standard output, for programs that call tankcal."""
 
+import codecs
 import json
 import sys
 from pathlib import Path
@@ -19,8 +20,9 @@ def add_json(parser):
 
 
 def print_json(**values):
-    """Print one object; numbers that do not exist are null."""
-    json.dump(values, sys.stdout, ensure_ascii=False, allow_nan=False, indent=1)
+    """Print one object, in ASCII if the output is not UTF-8; missing numbers are null."""
+    in_ascii = codecs.lookup(sys.stdout.encoding or "ascii").name != "utf-8"
+    json.dump(values, sys.stdout, ensure_ascii=in_ascii, allow_nan=False, indent=1)
     print()
 
 

@@ -1,4 +1,4 @@
-"""A command that somebody ends: by Ctrl-C, by SIGTERM, by closing its terminal."""
+"""A command that ends early: by Ctrl-C, SIGTERM, a closed terminal, or for want of memory."""
 
 import signal
 import threading
@@ -46,3 +46,16 @@ def stopped_status(error):
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__context__
     return None if error is None else 128 + getattr(error, "number", signal.SIGINT)
+
+
+_OF_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread")
+
+
+def is_of_memory(error):
+    """Whether a command failed because the system gave it no more memory.
+
+    A library that cannot be loaded, or a thread that cannot be started, is told as another error.
+    """
+    if isinstance(error, ImportError | RuntimeError | OSError):
+        return any(one in str(error).lower() for one in _OF_MEMORY)
+    return isinstance(error, MemoryError)

@@ -6,6 +6,8 @@ No text of a user is ever read as markup, for typst sees it only as strings of t
 import base64
 import json
 import shutil
+import subprocess
+import sys
 from contextlib import nullcontext
 from datetime import UTC, datetime
 from importlib.util import find_spec
@@ -28,6 +30,14 @@ UNSETTLED = "did not converge"  # in typst's warning that places are not those i
 LONG = 5000  # rows of a table: set at once, two documents with more would take gigabytes
 FORGETTING = 12  # pages later the typesetter has thrown away what none of them used
 _ALONE = Lock()
+IN_A_PROCESS = """
+import sys
+from pathlib import Path
+from tankcal.report.pdf import _compile_in
+made = _compile_in(sys.argv[1], int(sys.argv[2]))
+Path(sys.argv[1], "made.part").write_bytes(made)
+Path(sys.argv[1], "made.part").rename(Path(sys.argv[1], "made.pdf"))
+"""
 FONT_FILES = ("STIXGeneral*.ttf", "DejaVuSerif*.ttf", "DejaVuSans.ttf")
 
 
@@ -78,9 +88,36 @@ def _compile(files, timestamp):
     Where tables and figures find no places that they all agree to, the figures no longer ask for
     theirs, and where that is not enough nobody does.
     """
-    import typst
-
     return_freed_memory()  # of which nothing would serve the typesetter
+    with TemporaryDirectory(prefix="tankcal-page-") as folder:
+        _copy_fonts(folder)
+        for name, content in files.items():
+            (Path(folder) / name).write_bytes(content)
+        if not _is_memory_limited():
+            return _compile_in(folder, timestamp)
+        # without memory the typesetter ends its process: it gets one of its own
+        command = [sys.executable, "-c", IN_A_PROCESS, folder, str(timestamp)]
+        done = subprocess.run(command, capture_output=True, check=False)
+        made = Path(folder, "made.pdf")
+        if made.is_file():
+            return made.read_bytes()
+        if done.returncode == 1 and TankcalError.__name__.encode() in done.stderr:
+            raise TankcalError(done.stderr.decode(errors="replace").rpartition(": ")[2].strip())
+        raise MemoryError
+
+
+def _is_memory_limited():
+    """Whether the system gives this process no more than so much memory."""
+    if find_spec("resource") is None:  # Windows
+        return False
+    import resource
+
+    return resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
+
+
+def _compile_in(folder, timestamp):
+    """The PDF of main.typ in a folder. Raises TankcalError."""
+    import typst
 
     def compiled(ignore_system_fonts, places=PLACES):
         found, warnings = typst.compile_with_warnings(
@@ -96,19 +133,15 @@ def _compile(files, timestamp):
             return compiled(ignore_system_fonts, places[1:])
         return found
 
-    with TemporaryDirectory(prefix="tankcal-page-") as folder:
-        _copy_fonts(folder)
-        for name, content in files.items():
-            (Path(folder) / name).write_bytes(content)
+    try:
         try:
-            try:
-                return compiled(ignore_system_fonts=True)
-            except typst.TypstError as error:
-                if "could not be displayed" not in error.message:
-                    raise
-                return compiled(ignore_system_fonts=False)
+            return compiled(ignore_system_fonts=True)
         except typst.TypstError as error:
-            raise TankcalError(f"the PDF cannot be set: {error.message}") from error
+            if "could not be displayed" not in error.message:
+                raise
+            return compiled(ignore_system_fonts=False)
+    except typst.TypstError as error:
+        raise TankcalError(f"the PDF cannot be set: {error.message}") from error
 
 
 def _forget():

@@ -1,6 +1,8 @@
-"""A command that a signal ends: what it says, its exit status, and what it leaves."""
+"""A command that ends early: what it says, its exit status, and what it leaves."""
 
+import json
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 from conftest import EXAMPLE
 from draws import draws
+from job_builder import write_job
 
 from tankcal.cli import main
 from tankcal.cli.stopping import Ended, ended_by_signals, stopped_status
@@ -117,3 +120,53 @@ def test_runs_that_are_ended_lose_nothing(job):
 @pytest.mark.study
 def test_runs_that_are_ended_lose_nothing_study(job):
     assert {143, -signal.SIGKILL} <= end_runs(job, draws(40, 1000), np.random.default_rng(2))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are Linux's here")
+def test_too_little_memory_is_told_in_a_line(tmp_path):
+    """At every limit either the whole results or one line; what the typesetter needs is one too."""
+    folder = write_job(tmp_path / "job")
+    ends = set()
+    for limit_mb in (420, 450, 480, 1200):
+        done = subprocess.run(
+            [sys.executable, "-m", "tankcal", "run", str(folder), "--quiet"],
+            capture_output=True, text=True, timeout=200, check=False,
+            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit_mb << 20,) * 2),  # noqa: B023
+        )  # fmt: skip
+        ends.add(done.returncode)
+        assert "Traceback" not in done.stderr
+        if done.returncode:
+            assert len(done.stderr.splitlines()) == 1
+            assert not (folder / "results").exists()
+        else:
+            assert (folder / "results" / "report.pdf").is_file()
+    assert 0 in ends
+    assert ends <= {0, 1, 2}  # 1: OpenBLAS itself gives up, in a line of its own
+
+
+@pytest.mark.parametrize(
+    "error", [MemoryError(), ImportError("x.so: failed to map segment from shared object"),
+              RuntimeError("can't start new thread"), OSError(12, "Cannot allocate memory")]
+)  # fmt: skip
+def test_want_of_memory_has_its_line(monkeypatch, capsys, error):
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr("tankcal.cli.running._run", fail)
+    monkeypatch.setattr("tankcal.cli.running.prepare_for_small_work", fail)
+    assert main(["demo", "--quiet"]) == 2
+    assert "not enough memory" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-8"])
+def test_output_of_any_encoding(tmp_path, encoding):
+    """In the language of a person whose terminal or file lacks a letter; JSON stays JSON."""
+    environment = os.environ | {"PYTHONIOENCODING": encoding, "LANG": "es_ES.UTF-8"}
+    for arguments in (["--help"], ["run", str(tmp_path / "não Ω"), "--json"]):
+        done = subprocess.run(
+            [sys.executable, "-m", "tankcal", *arguments], env=environment, capture_output=True
+        )
+        assert b"Traceback" not in done.stderr
+    assert "não Ω" in json.loads(done.stdout.decode(encoding))["problems"][0]["file"]
