@@ -46,6 +46,7 @@ REGISTERS = {  # what each lists
 }
 SETTINGS_FILE = "job.toml"
 SETTINGS_SHEET = "job"
+WORKBOOK_FILE = "job.xlsx"  # of a job folder that is filled in as a workbook
 REFUSED_FILE = "image_points_refused.csv"  # written beside image_points.csv, never read
 COVARIANCE_FILE = "points_cov.npz"
 RADII_COVARIANCE_FILE = "radii_cov.npz"

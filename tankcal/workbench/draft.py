@@ -16,7 +16,15 @@ from tankcal.errors import InputError, Problem
 from tankcal.job.contract import COLUMNS, KINDS, columns_of
 from tankcal.job.folder import csv_marks, decode, parsed_toml, read_toml
 from tankcal.job.loading import load_edited
-from tankcal.job.tables import REGISTERS, SETTINGS_FILE, TABLES, Log, meant, read_bytes
+from tankcal.job.tables import (
+    REGISTERS,
+    SETTINGS_FILE,
+    TABLES,
+    WORKBOOK_FILE,
+    Log,
+    meant,
+    read_bytes,
+)
 from tankcal.messages import message
 from tankcal.text.decoding import decode_text, find_encoding
 from tankcal.workbench.book import new_sheet_table, read_book, written_book
@@ -46,6 +54,8 @@ def source_of(path):
     with suppress(OSError, ValueError):
         if folder.is_dir() and (folder / SETTINGS_FILE).is_file():
             return folder
+        if (folder / WORKBOOK_FILE).is_file():
+            return folder / WORKBOOK_FILE
         if path.suffix.lower() == ".xlsx" and path.is_file():
             return path
     raise InputError(

@@ -25,6 +25,7 @@ OF_SHELLS = (*STRAPPED, "wall-hits", "tangents", DECLARED)  # upright, or SURVEY
 STARTS_OF_STRAPPING = {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
 STARTS_OF_LIQUID = {"survey.side": "inside", "datum.bottom_z_m": "0.0"}  # of upright tanks
 OF_GREAT_CIRCLES = (("sphere", "ovality_mm"), ("sphere", "form_mm"))
+DECIMAL_COMMAS = {"separator": ";", "decimal": ","}  # as spreadsheets in these languages write CSV
 PLACEHOLDER = "NAME"  # of a camera or an instrument
 
 
@@ -86,6 +87,8 @@ class Form:
             return self.kind
         if (section, field.name) == ("table", "language") and self.language != DEFAULT:
             return self.language
+        if section == "csv" and self.language != DEFAULT:
+            return DECIMAL_COMMAS[field.name]
         if self.survey == "tangents" and (section, field.name) == ("survey", "side"):
             return "outside"
         if self.survey in (METERED, DECLARED) and self.kind == "vertical":
