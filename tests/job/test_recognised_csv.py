@@ -75,7 +75,7 @@ def test_numbers_with_two_meanings_are_refused_in_one_line(tmp_path, mark):
     folder = write_folder(tmp_path / "job", job_parts())
     rows = [f"P{i};{i + 1}{mark}234;{i + 2}{mark}345;1{mark}456" for i in range(9)]
     (folder / "points.csv").write_text("\n".join(["point;x_m;y_m;z_m", *rows]) + "\n")
-    [problem] = problems_of(folder)
+    [problem] = [one for one in problems_of(folder) if one.startswith("points.csv")]
     assert f"points.csv, row 2, x_m: found '1{mark}234', which is 1.234 or 1234" in problem
     assert "set [csv] decimal" in problem
 
@@ -94,8 +94,8 @@ def test_the_other_mark_is_read_where_it_has_one_meaning(tmp_path, number, other
 def test_a_file_against_the_declared_mark_is_refused_in_one_line(tmp_path):
     parts = job_parts(settings={"csv.separator": ",", "csv.decimal": "."})
     folder = write_folder(tmp_path / "job", parts)
-    (folder / "courses.csv").write_text("course;height_m\nC1;1,900\nC2;1,900\n")
-    [problem] = [one for one in problems_of(folder) if "courses.csv" in one]
+    (folder / "courses.csv").write_text("course;height_m;thickness_mm\nC1;1,900;8\nC2;1,900;8\n")
+    [problem] = [one for one in problems_of(folder) if ", height_m: found" in one]
     assert "which is 1.900 or 1900" in problem
     assert "set decimal = ',' in job.toml if it is 1.900" in problem
 
@@ -103,12 +103,12 @@ def test_a_file_against_the_declared_mark_is_refused_in_one_line(tmp_path):
 def test_one_number_that_shows_its_mark_decides_for_the_file(tmp_path):
     folder = write_folder(tmp_path / "job", job_parts())
     heights = [one.height_m for one in load(folder).courses]
-    rows = [f"C{i};{h:.3f}".replace(".", ",") for i, h in enumerate(heights)]
-    text = "\n".join(["course;height_m", *rows]) + "\n"
+    rows = [f"{i};{h:.3f};8".replace(".", ",") for i, h in enumerate(heights, 1)]
+    text = "\n".join(["course;height_m;thickness_mm", *rows]) + "\n"
     (folder / "courses.csv").write_text(text)
-    [problem] = [one for one in problems_of(folder) if "courses.csv" in one]
+    [problem] = [one for one in problems_of(folder) if ", height_m: found" in one]
     assert "which is" in problem
-    (folder / "courses.csv").write_text(text.replace("00\n", "0\n", 1))  # 1,90 in place of 1,900
+    (folder / "courses.csv").write_text(text.replace("00;", "0;", 1))  # 1,90 in place of 1,900
     assert [one.height_m for one in load(folder).courses] == pytest.approx(heights)
 
 
