@@ -295,9 +295,14 @@ def read_columns(name, table, log, fields=None, kind=None):
     fields  its columns; None: those that the table of this name has in a job of a tank of the kind
     """
     fields = columns_of(name, kind) if fields is None else fields
-    known = [field.name for field in fields]
+    known, told = [field.name for field in fields], ()
+    if table.decimal is not None and not set(table.headings) <= set(known):
+        from tankcal.job.headings import rename_headings  # lists of others alone need its words
+
+        headings, told = rename_headings(table, fields, log)
+        table = replace(table, headings=headings)
     for heading in table.headings:
-        if heading not in known:
+        if heading not in known and heading not in told:
             expected = message(
                 "unknown_column",
                 "unknown column{hint}; expected {known}",

@@ -6,7 +6,7 @@ from pathlib import Path
 from tankcal.job.building import job_of
 from tankcal.job.folder import read_folder
 from tankcal.job.model import Job
-from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE, Log
+from tankcal.job.tables import SETTINGS_FILE, TABLES, WORKBOOK_FILE, Log
 from tankcal.messages import message
 
 OTHER_WORKBOOKS = (".xls", ".xlsm", ".xlsb", ".xltx", ".ods", ".numbers")
@@ -91,6 +91,14 @@ def _form_in(folder, log, edited):
     if edited is not None or not book.is_file():
         return folder
     if not (folder / SETTINGS_FILE).is_file():
+        ignored = [f"{table}.csv" for table in TABLES if (folder / f"{table}.csv").is_file()]
+        if ignored:
+            text = message(
+                "beside_workbook",
+                "not read: the job of this folder is {book}",
+                book=WORKBOOK_FILE,
+            )
+            log.warning(ignored[0], text)
         return book
     from tankcal.job.forms import filled_workbook  # folders of older versions have both
 
