@@ -2,7 +2,6 @@
 
 import sys
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import Path
 
 from tankcal.cli.importing import say_next
@@ -10,7 +9,7 @@ from tankcal.cli.machine import print_json
 from tankcal.cli.showing import complain, say, say_in_language, warn
 from tankcal.errors import problem_of
 from tankcal.fieldbooks.lists import refuse_missing, write_list
-from tankcal.job.headings import Meaning
+from tankcal.job.headings import stated_meaning
 from tankcal.messages import message, printable
 
 NO = ("n", "no", "nao", "não")
@@ -87,7 +86,8 @@ def _ask_missing(found):
             print(f"  {number} {printable(heading)}")
         answer = _answer("> ")
         if answer.isdecimal() and 1 <= int(answer) <= len(free):
-            meanings[free[int(answer) - 1]] = Meaning(field.name, Fraction(1))
+            heading = free[int(answer) - 1]
+            meanings[heading] = stated_meaning(heading, field)
     return replace(found, meanings=meanings)
 
 

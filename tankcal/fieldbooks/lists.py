@@ -11,7 +11,7 @@ from tankcal.job.decimals import has_two_meanings, settle_decimal
 from tankcal.job.entries import read_columns
 from tankcal.job.fields import is_blank
 from tankcal.job.folder import declared_marks, parsed_toml, read_csv, read_toml
-from tankcal.job.headings import Meaning, meanings_of
+from tankcal.job.headings import Meaning, meanings_of, stated_meaning
 from tankcal.job.tables import NOT_KNOWN, SETTINGS_FILE, Log, Table, nearest, read_bytes
 from tankcal.messages import message
 from tankcal.text.naming import MAX_NAME
@@ -104,8 +104,7 @@ def _names(fields):
 def _stated(heading, column, fields):
     """The Meaning that a user states, with the factor of the unit that the heading has."""
     [field] = [one for one in fields if one.name == column]
-    found = meanings_of([heading], [field]).get(heading)
-    return found if found and found.factor is not None else Meaning(column, Fraction(1))
+    return stated_meaning(heading, field)
 
 
 def _check_given(heading, column, table, fields, log):

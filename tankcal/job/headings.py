@@ -75,6 +75,18 @@ def meanings_of(headings, fields):
     return {heading: one for heading, one in found.items() if columns.count(one.column) == 1}
 
 
+def stated_meaning(heading, field):
+    """The Meaning of a heading that the user gives a column: its unit in brackets has a factor."""
+    from tankcal.job.starter.texts import parted
+
+    parts = _BRACKETED.fullmatch(heading)
+    unit = _unit_of(parts[2]) if parts else ""
+    own = parted(field.name)[1]
+    if unit in LENGTHS and own in LENGTHS:
+        return Meaning(field.name, LENGTHS[unit] / LENGTHS[own], unit)
+    return Meaning(field.name, Fraction(1), unit)
+
+
 def rename_headings(table, fields, log):
     """(headings, refused) of a Table, with the names of columns in place of foreign headings.
 
@@ -96,7 +108,8 @@ def rename_headings(table, fields, log):
         if one.factor != 1:
             text = message(
                 "heading_in_other_unit",
-                "is {column} in {unit}; expected its own unit: tankcal import {file} --replace converts it",
+                "is {column} in {unit}; expected its own unit: tankcal import {file} --replace "
+                "converts it",
                 column=one.column,
                 unit=one.unit,
                 file=table.file,
@@ -126,14 +139,18 @@ def _meaning(heading, field, names):
         parts = pattern.fullmatch(heading.replace("_", " ").strip())
         if parts is None or _plain(parts[1]) not in names:
             continue
-        unit = _plain(parts[2])
-        unit = UNIT_NAMES.get(unit, unit)
+        unit = _unit_of(parts[2])
         if unit == _plain(own):
             return [Meaning(field.name, Fraction(1), unit)]
         if unit in LENGTHS and own in LENGTHS:
             return [Meaning(field.name, LENGTHS[unit] / LENGTHS[own], unit)]
         return [Meaning(field.name, None, parts[2].strip())] if pattern is _BRACKETED else []
     return []
+
+
+def _unit_of(text):
+    plain = _plain(text)
+    return UNIT_NAMES.get(plain, plain)
 
 
 def _plain(text):
