@@ -6,9 +6,9 @@
 import datetime
 
 from tankcal.job.contract import COLUMNS, KEYS
+from tankcal.job.contract.keys import STARTS_OF_LIQUID, STARTS_OF_STRAPPING
 from tankcal.job.folder import read_folder
 from tankcal.job.sheets import read_workbook
-from tankcal.job.starter.form import STARTS_OF_LIQUID, STARTS_OF_STRAPPING
 from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE, Log
 from tankcal.messages import message
 from tankcal.text.form_words import NO, YES, meant

@@ -11,6 +11,8 @@ from fractions import Fraction
 
 from tankcal.messages import message
 from tankcal.text.languages import LANGUAGES
+from tankcal.text.unit_endings import parted
+from tankcal.text.word_files import load_words
 
 USUAL = {  # by the name of a column without its unit
     "point": (
@@ -77,8 +79,6 @@ def meanings_of(headings, fields):
 
 def stated_meaning(heading, field):
     """The Meaning of a heading that the user gives a column: its unit in brackets has a factor."""
-    from tankcal.job.starter.texts import parted
-
     parts = _BRACKETED.fullmatch(heading)
     unit = _unit_of(parts[2]) if parts else ""
     own = parted(field.name)[1]
@@ -121,17 +121,13 @@ def rename_headings(table, fields, log):
 
 def _names_of(field):
     """Plain names of a column without its unit."""
-    from tankcal.job.starter.texts import parted, texts_in
-
     stem, _ = parted(field.name)
-    labels = [texts_in(one).words["input"]["labels"].get(stem, stem) for one in LANGUAGES]
+    labels = [load_words(one)["input"]["labels"].get(stem, stem) for one in LANGUAGES]
     return {_plain(one) for one in (stem, *labels, *USUAL.get(stem, ()))}
 
 
 def _meaning(heading, field, names):
     """A list of the Meaning that a heading has as a column, or an empty list."""
-    from tankcal.job.starter.texts import parted
-
     _, own = parted(field.name)
     if _plain(heading) in names:
         return [Meaning(field.name, Fraction(1))]
