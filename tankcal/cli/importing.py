@@ -164,10 +164,8 @@ def _import(options):
     for line in found.summary:
         say(line)
     warn(found.warnings)
-    say(message("import_wrote", "wrote into {folder}:", folder=str(options.out)))
-    for path in found.paths:
-        print(f"  {printable(path)}")
-    say_next(Path(options.out), "total-station" if options.no_hits else "wall-hits")
+    survey = "total-station" if options.no_hits else "wall-hits"
+    say_written(Path(options.out), found.paths, survey)
     return None
 
 
@@ -233,7 +231,15 @@ def _column(text):
     return heading.strip(), column.strip()
 
 
-def say_next(folder, survey):
+def say_written(folder, paths, survey):
+    """Print the files that were written, and the next command."""
+    say(message("import_wrote", "wrote into {folder}:", folder=str(folder)))
+    for path in paths:
+        print(f"  {printable(path)}")
+    _say_next(folder, survey)
+
+
+def _say_next(folder, survey):
     """What to do then; a folder without job.toml holds tables, but is no job yet."""
     job = folder
     if not (folder / "job.toml").is_file():

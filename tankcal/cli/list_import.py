@@ -4,7 +4,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from tankcal.cli.importing import say_next
+from tankcal.cli.importing import say_written
 from tankcal.cli.machine import print_json
 from tankcal.cli.showing import complain, say, say_in_language, warn
 from tankcal.errors import problem_of
@@ -43,18 +43,20 @@ def import_list(found, options):
             exit_status=0, summary=[str(one) for one in lines], warnings=warnings, files=files
         )
         return 0
-    say(message("import_wrote", "wrote into {folder}:", folder=str(folder)))
-    for path in paths:
-        print(f"  {printable(path)}")
-    say_next(folder, None)
+    say_written(folder, paths, None)
     return 0
 
 
 def _lines(found, folder):
     """What the list becomes: a line for each heading."""
-    text = "{file} becomes {table}.csv of {folder}:"
-    of_file = {"file": found.table.file, "table": found.name, "folder": str(folder)}
-    lines = [message("list_becomes", text, **of_file)]
+    first = message(
+        "list_becomes",
+        "{file} becomes {table}.csv of {folder}:",
+        file=found.table.file,
+        table=found.name,
+        folder=str(folder),
+    )
+    lines = [first]
     for heading in found.table.headings:
         one = found.meanings.get(heading)
         named = {"heading": heading}
