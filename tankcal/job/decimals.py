@@ -6,7 +6,7 @@ with one between thousands: the other numbers of the file, or [csv] in job.toml,
 
 import re
 
-from tankcal.job.tables import NOT_KNOWN, SETTINGS_FILE, shown
+from tankcal.job.tables import NOT_KNOWN, shown
 from tankcal.messages import message
 from tankcal.text.naming import MAX_NAME
 from tankcal.text.numerals import NUMBER
@@ -51,19 +51,17 @@ def settle_decimal(table, fields, log):
     expected = message(
         "two_meanings",
         "found {found}, which is {small} or {large}; expected a decimal mark that is known: set "
-        "[csv] decimal = '.' or ',' in {settings_file}",
+        "[csv] decimal = '.' or ','",
         **found,
-        settings_file=SETTINGS_FILE,
     )
     if table.decimal != NOT_KNOWN:
         expected = message(
             "two_meanings_declared",
-            "found {found}, which is {small} or {large}; expected '{mark}' as decimal mark, as "
-            "[csv] declares: set decimal = '{other}' in {settings_file} if it is {small}",
+            "found {found}, which is {small} or {large}; expected '{mark}' as decimal mark: "
+            "set [csv] decimal = '{other}' if it is {small}",
             **found,
             mark=table.decimal,
             other="," if table.decimal == "." else ".",
-            settings_file=SETTINGS_FILE,
         )
     log.problem(table.file, expected, row, column)
     return "," if "," in text else "."

@@ -97,7 +97,7 @@ def test_a_file_against_the_declared_mark_is_refused_in_one_line(tmp_path):
     (folder / "courses.csv").write_text("course;height_m;thickness_mm\nC1;1,900;8\nC2;1,900;8\n")
     [problem] = [one for one in problems_of(folder) if ", height_m: found" in one]
     assert "which is 1.900 or 1900" in problem
-    assert "set decimal = ',' in job.toml if it is 1.900" in problem
+    assert "set [csv] decimal = ',' if it is 1.900" in problem
 
 
 def test_one_number_that_shows_its_mark_decides_for_the_file(tmp_path):
