@@ -148,7 +148,7 @@ def _with_points(raw):
     settings = {name: entries for name, entries in raw.settings.items() if name != "csv"}
     tables = {
         name: replace(table, decimal=".", rows=tuple(map(_in_points, table.rows)))
-        if table is not None and table.decimal == ","
+        if table is not None and table.decimal is not None
         else table
         for name, table in raw.tables.items()
     }
