@@ -43,6 +43,7 @@ UNIT_NAMES = {
     "millimetres": "mm", "millimeters": "mm", "centimetros": "cm", "centimetres": "cm",
     "inches": "in", "pol": "in", "polegadas": "in", "pulg": "in", "pulgadas": "in",
     "feet": "ft", "pes": "ft", "pies": "ft",
+    "deg": "°", "degrees": "°", "graus": "°", "grados": "°",
 }  # fmt: skip
 _BRACKETED = re.compile(r"(.*?)[\s,]*[(\[]([^()\[\]]*)[)\]]\s*")
 _LAST_WORD = re.compile(r"(.*\S)[\s,]+(\S+)")

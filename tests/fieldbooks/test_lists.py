@@ -169,6 +169,7 @@ def test_a_heading_in_another_unit_is_refused(job):
         ("courses", "Espessura (mm)", "thickness_mm"),
         ("circumferences", "Lectura", "reading_m"),
         ("wall_hits", "Dirección (gon)", "direction_gon"),
+        ("wall_hits", "Direction (deg)", "direction_deg"),
         ("wall_hits", "Dirección", None),  # in which unit?
         ("points", "X_M", "x_m"),
         ("points", "Diâmetro", None),
