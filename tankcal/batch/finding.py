@@ -17,7 +17,13 @@ from pathlib import Path
 from tankcal.batch.asked import OWN, Asked
 from tankcal.errors import InputError, Problem
 from tankcal.job.folder import decode
-from tankcal.job.tables import SETTINGS_FILE, SETTINGS_SHEET, Log, read_bytes
+from tankcal.job.tables import (
+    SETTINGS_FILE,
+    SETTINGS_SHEET,
+    WORKBOOK_FILE,
+    Log,
+    read_bytes,
+)
 from tankcal.messages import message
 from tankcal.text.naming import file_name
 
@@ -330,6 +336,8 @@ def _label(one):
     if one.own.get("name"):
         return file_name(one.own["name"], "job")
     path = Path(os.path.abspath(one.source))
+    if path.name == WORKBOOK_FILE:
+        path = path.parent
     if path.name not in SAVED:
         return file_name(path.stem if path.suffix.lower() == BOOK else path.name, "job")
     place = path.parent

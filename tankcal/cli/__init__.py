@@ -39,10 +39,10 @@ table, with its uncertainty, as Excel workbook, PDF certificate and notebook."""
 EPILOG = """\
 a new tank, step by step:
   tankcal new my-tank           write an empty job: the folder my-tank with job.toml, points.csv,
-                                courses.csv, and the same as one workbook, job.xlsx
+                                courses.csv
+  tankcal new my-tank --workbook   or, for those who prefer Excel, with one workbook, job.xlsx
   (fill in the blanks, in the CSV files or in the workbook)
   tankcal run my-tank           compute it; the results are in my-tank/results
-  tankcal run my-tank/job.xlsx  the same, from the workbook
   tankcal notebook my-tank      fill it in, check and compute it in a notebook (JupyterLab)
   tankcal app my-tank           the same as a page without code
   tankcal report my-tank/results --language es   the papers again, in Spanish

@@ -3,7 +3,13 @@
 from pathlib import Path
 
 from tankcal.job.folder import MAX_SETTINGS_BYTES, parsed_toml
-from tankcal.job.tables import SETTINGS_FILE, SETTINGS_SHEET, Log, read_bytes
+from tankcal.job.tables import (
+    SETTINGS_FILE,
+    SETTINGS_SHEET,
+    WORKBOOK_FILE,
+    Log,
+    read_bytes,
+)
 from tankcal.text.decoding import read_json
 from tankcal.text.languages import DEFAULT, LANGUAGES, nearest_language
 from tankcal.text.words import load_words
@@ -16,6 +22,8 @@ def asked_language(path):
     """
     path, log = Path(path), Log()
     try:
+        if (path / WORKBOOK_FILE).is_file() and not (path / SETTINGS_FILE).is_file():
+            path /= WORKBOOK_FILE
         if path.suffix.lower() == ".xlsx":
             given = _in_workbook(path, log)
         else:

@@ -7,26 +7,32 @@ from pathlib import Path
 from tankcal.cli.arguments import add_language, positive, refuse_argument
 from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.showing import prepare_for_small_work, say, speak, warn
-from tankcal.errors import problem_of
+from tankcal.errors import InputError, Problem, problem_of
+from tankcal.job.tables import WORKBOOK_FILE
 from tankcal.messages import message, printable
+
+LISTS = (".csv", ".txt", ".tsv")
 
 
 def add(commands):
     """The parser of `tankcal import`."""
     parser = commands.add_parser(
         "import",
-        help="read field books of total stations into a job",
+        help="read field books or a list of points into a job",
         description="Read the files that total stations export (Leica GSI, RW5, Trimble JobXML, "
         "Sokkia SDR33, plain tables) and write the tables of a job: set-ups, bare hits of the "
-        "wall, control targets, readings that tie set-ups, all or nothing. docs/import.md says "
-        "what is read of each format.",
+        "wall, control targets, readings that tie set-ups, all or nothing. A list of points (CSV) "
+        "with headings of its own becomes points.csv, or the table that --table names. "
+        "docs/import.md says what is read of each format.",
         epilog="exit status: 0 done; 2 the files or the choices must be mended (one line per "
         "problem: file, row, what was expected; nothing is written then).",
     )
     parser.add_argument(
         "names", metavar="FILE", nargs="+", help="the files, in the order of the measurement"
     )
-    parser.add_argument("--out", metavar="DIR", required=True, help="the folder of the job")
+    parser.add_argument(
+        "--out", metavar="DIR", help="the folder of the job (default: this folder, if it is one)"
+    )
     parser.add_argument(
         "--format",
         choices=("gsi", "rw5", "jxl", "sdr", "csv"),
@@ -34,6 +40,19 @@ def add(commands):
     )
     parser.add_argument(
         "--profile", metavar="FILE.toml", help="which column of a plain table is what"
+    )
+    parser.add_argument(
+        "--table", metavar="NAME", help="the table of the job that a list becomes (default: points)"
+    )
+    parser.add_argument(
+        "--column",
+        metavar="HEADING=COLUMN",
+        action="append",
+        default=[],
+        help="what a heading of a list means, such as 'Este (m)=x_m'",
+    )
+    parser.add_argument(
+        "--yes", action="store_true", help="write a list without asking at the terminal"
     )
     for name, text in (
         ("hits", "names or codes of bare hits, 1-200 or W* (default: those that begin with WALL, "
@@ -106,7 +125,14 @@ def _asked_of_folder(folder):
 
 def _import(options):
     prepare_for_small_work()
+    options.out = options.out or _folder_here()
     speak(options.language or _asked_of_folder(Path(options.out)))
+    _refuse_workbook(Path(options.out))
+    as_list = _list_of(options)
+    if as_list is not None:
+        from tankcal.cli.list_import import import_list
+
+        return import_list(as_list, options)
     from tankcal.fieldbooks import Choices, import_fieldbooks
 
     choices = Choices(
@@ -134,14 +160,83 @@ def _import(options):
             warnings=[problem_of(one) for one in found.warnings],
             files=list(map(str, found.paths)),
         )
-        return
+        return None
     for line in found.summary:
         say(line)
     warn(found.warnings)
-    say(message("import_wrote", "wrote into {folder}:", folder=str(options.out)))
-    for path in found.paths:
+    survey = "total-station" if options.no_hits else "wall-hits"
+    say_written(Path(options.out), found.paths, survey)
+    return None
+
+
+def _folder_here():
+    """The folder of the command when it is a job."""
+    if Path("job.toml").is_file():
+        return "."
+    raise refuse_argument(
+        message("import_without_out", "expected --out DIR, the folder of the job")
+    )
+
+
+def _refuse_workbook(folder):
+    """Raise InputError for a job that is filled in as a workbook: its CSV files are not read."""
+    if (folder / WORKBOOK_FILE).is_file() and not (folder / "job.toml").is_file():
+        text = message(
+            "import_into_workbook",
+            "is filled in as {book}; expected a job of text files: tankcal new ANOTHER-FOLDER",
+            book=WORKBOOK_FILE,
+        )
+        raise InputError(Problem(folder.resolve().name, text))
+
+
+def _list_of(options):
+    """ForeignList of the only file where it is a list of points or of another table, or None."""
+    if len(options.names) != 1 or options.profile or options.format:
+        return None
+    from tankcal.fieldbooks import lists
+    from tankcal.fieldbooks.detection import is_field_book
+
+    path, given = Path(options.names[0]), dict(map(_column, options.column))
+    is_named = bool(options.table or given)
+    if not is_named and (path.suffix.lower() not in LISTS or not path.is_file()):
+        return None
+    name = options.table or (path.stem if lists.is_table(path.stem) else "points")
+    if not lists.is_table(name):
+        raise refuse_argument(
+            message("list_no_table", "found --table {name}; expected a table of a job", name=name)
+        )
+    if not is_named and (path.stat().st_size > lists.MAX_BYTES or is_field_book(path.read_bytes())):
+        return None
+    try:
+        found = lists.read_list(path, Path(options.out), name, given)
+    except InputError:
+        if is_named:
+            raise
+        return None  # the reader of field books refuses it
+    names = {one.name for one in found.missing} - {"point"}
+    is_list = len(names) < sum(field.required for field in lists.COLUMNS[name]) - 1
+    return found if is_named or is_list else None
+
+
+def _column(text):
+    heading, mark, column = text.rpartition("=")
+    if not (mark and heading.strip() and column.strip()):
+        raise refuse_argument(
+            message(
+                "list_bad_column",
+                "found --column {text!r}; expected HEADING=COLUMN, such as 'Este (m)=x_m'",
+                text=text,
+            )
+        )
+    return heading.strip(), column.strip()
+
+
+def say_written(folder, paths, survey):
+    """Print the files that were written, and the next command."""
+    say(message("import_wrote", "wrote into {folder}:", folder=str(folder)))
+    for path in paths:
         print(f"  {printable(path)}")
-    _say_next(Path(options.out), "total-station" if options.no_hits else "wall-hits")
+    _say_next(folder, survey)
 
 
 def _say_next(folder, survey):
@@ -157,7 +252,8 @@ def _say_next(folder, survey):
             job=str(job),
         )
         say(text)
-        print(f"  tankcal new {shlex.quote(str(job))} --survey {survey}")
+        of_survey = "" if survey is None else f" --survey {survey}"
+        print(f"  tankcal new {shlex.quote(str(job))}{of_survey}")
         print(f"  tankcal import ... --out {shlex.quote(str(job))}")
     say(message("import_next", "then"))
     print(f"  tankcal run {shlex.quote(str(job))}")

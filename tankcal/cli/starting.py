@@ -1,11 +1,14 @@
 """`tankcal new`: an empty job to fill in."""
 
+import shlex
 from pathlib import Path
 
-from tankcal.cli.showing import say, speak
+from tankcal.cli.showing import language_of_run, say, speak
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message, printable
-from tankcal.text.languages import DEFAULT, LANGUAGES
+from tankcal.text.languages import LANGUAGES
+
+USUAL_KIND = "vertical"
 
 
 def add(commands):
@@ -13,23 +16,24 @@ def add(commands):
     new = commands.add_parser(
         "new",
         help="write an empty job to fill in",
-        description="Write a starter job: job.toml and the CSV files of that kind of tank, with "
-        "comments, and the same as one workbook, job.xlsx. Fill in one of the two.",
+        description="Write a starter job for that kind of tank, with comments: job.toml and CSV "
+        "files, or with --workbook the same as one Excel workbook, job.xlsx.",
     )
     new.add_argument(
         "directory", metavar="DIR", help="a folder to make; with --workbook also a new .xlsx file"
     )
-    new.add_argument("--workbook", action="store_true", help="write the workbook alone")
+    new.add_argument(
+        "--workbook", action="store_true", help="write an Excel workbook in place of text files"
+    )
     new.add_argument(
         "--language",
         choices=LANGUAGES,
-        default=DEFAULT,
-        help="of the workbook's explanations and of the papers (default: en)",
+        help="of the explanations and of the papers (default: that of the environment)",
     )
     new.add_argument(
         "--kind",
         choices=("vertical", "horizontal", "sphere", "mesh"),
-        default="vertical",
+        default=USUAL_KIND,
         help="kind of tank (default: vertical)",
     )
     new.add_argument(
@@ -63,36 +67,47 @@ def _refuse_other_survey(kind, survey, language):
 
 def _new(options):
     from tankcal.job.starter import write_input_workbook, write_starter
+
+    if options.language:
+        speak(options.language)
+    directory, language = Path(options.directory), options.language or language_of_run()
+    form = (options.kind, options.survey, language)
+    _refuse_other_survey(*form)
+    if not options.workbook:
+        write_starter(directory, *form)
+        _write_field_sheets(directory, *form)
+        text = "wrote {file}: fill in job.toml and the CSV files, then"
+        _say_then(message("wrote_folder", text, file=str(directory)), directory)
+        say(message("workbook_instead", "to fill in an Excel workbook in their place:"))
+        _print_command("new", directory, *_given(options), "--workbook")
+        return
+    path = write_input_workbook(directory, *form)
+    if path != directory:
+        _write_field_sheets(directory, *form)
+    text = "wrote {file}: fill it in, save it, then"
+    _say_then(message("wrote_workbook", text, file=str(path)), directory)
+
+
+def _say_then(text, job):
+    say(text)
+    _print_command("run", job)
+
+
+def _print_command(*words):
+    print(f"  {printable(shlex.join(['tankcal', *map(str, words)]))}")
+
+
+def _given(options):
+    """The options of the same form, as they were given."""
+    given = {"--kind": options.kind, "--survey": options.survey, "--language": options.language}
+    usual = {"--kind": USUAL_KIND, "--survey": None, "--language": None}
+    return [word for name, one in given.items() if one != usual[name] for word in (name, one)]
+
+
+def _write_field_sheets(directory, kind, survey, language):
     from tankcal.report.field_forms import FILE, is_filled_by_pen, write_field_sheets
 
-    if options.language != DEFAULT:
-        speak(options.language)
-    directory = Path(options.directory)
-    form = (options.kind, options.survey, options.language)
-    _refuse_other_survey(*form)
-    if options.workbook:
-        path = write_input_workbook(directory, *form)
-        say(message("wrote_workbook", "wrote {file}: fill it in, save it, then", file=str(path)))
-        print(f"  tankcal run {printable(path)}")
-        return
-    write_starter(directory, *form)
-    if is_filled_by_pen(options.survey):
+    if is_filled_by_pen(survey):
         sheets = directory / FILE
-        write_field_sheets(sheets, options.survey, options.language, options.kind)
+        write_field_sheets(sheets, survey, language, kind)
         say(message("wrote_field_sheets", "wrote {file}: print it for the crew", file=str(sheets)))
-    say(
-        message(
-            "wrote_folder",
-            "wrote {file}: fill in job.toml and the CSV files, or job.xlsx instead, then",
-            file=str(directory),
-        )
-    )
-    book = directory / "job.xlsx"
-    say(
-        message(
-            "run_either",
-            "  tankcal run {folder}     or     tankcal run {file}",
-            folder=str(directory),
-            file=str(book),
-        )
-    )

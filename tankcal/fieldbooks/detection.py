@@ -4,6 +4,7 @@ import re
 
 from tankcal.fieldbooks import gsi, jobxml, profile, rw5, sdr
 from tankcal.fieldbooks.cutting import tell_cut_numbers
+from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.text.decoding import decode_text, find_encoding
 
@@ -72,6 +73,12 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
                           " its last line complete?", count=count))  # fmt: skip
     tell_cut_numbers(book, log)
     return book
+
+
+def is_field_book(data):
+    """Whether bytes are a field book in a format that its content shows."""
+    text = _text("", data, Log())
+    return text is not None and _format_of(text, None) is not None
 
 
 def _text(file, data, log):

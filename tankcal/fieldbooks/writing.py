@@ -10,8 +10,8 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from tankcal.errors import InputError, Problem
 from tankcal.fieldbooks.rows import CONTRACT, columns_of
+from tankcal.job.contract import COLUMNS
 from tankcal.job.folder import csv_marks, read_toml
 from tankcal.job.tables import SETTINGS_FILE, Log, read_bytes
 from tankcal.messages import message
@@ -23,27 +23,45 @@ def write_tables(folder, tables, *, replace):
 
     Raises InputError when the folder is a file, or where tables with rows stand in the way.
     """
-    folder, log = Path(folder), Log()
+    folder = Path(folder)
+    standing = tables_with_rows(folder, CONTRACT)
+    refuse_standing(folder, [] if replace else [name for name in standing if name in tables])
+    grids = {name: _grid(name, rows) for name, rows in tables.items()}
+    paths = write_grids(folder, grids)
+    return paths, [one for one in standing if one not in tables]
+
+
+def tables_with_rows(folder, names):
+    """The tables of a job folder that have rows already."""
+    return [name for name in names if _has_rows(folder / f"{name}.csv")]
+
+
+def refuse_standing(folder, names):
+    """Raise InputError when the folder is a file, or for tables that are not to be replaced."""
+    log = Log()
     if folder.exists() and not folder.is_dir():
         text = message("import_into_file", "is a file; expected the folder of a job")
-        raise InputError(Problem(folder.name, text))
+        log.problem(folder.name, text)
+    for name in names:
+        text = message(
+            "table_stands",
+            "has rows already, and is left as it is; expected an empty table, or --replace",
+        )
+        log.problem(f"{name}.csv", text)
+    log.stop_if_problems()
+
+
+def write_grids(folder, grids, others=None):
+    """Write {table: rows of cells, numbers with a point} and {name: text}; returns the paths."""
+    log = Log()
     separator, decimal = _marks(folder, log)
-    standing = [name for name in CONTRACT if _has_rows(folder / f"{name}.csv")]
-    if not replace:
-        for name in standing:
-            if name in tables:
-                text = message(
-                    "table_stands",
-                    "has rows already, and is left as it is; expected an empty table, or --replace",
-                )
-                log.problem(f"{name}.csv", text)
     log.stop_if_problems()
     texts = {
-        f"{name}.csv": _comments(folder / f"{name}.csv") + _text(name, rows, separator, decimal)
-        for name, rows in tables.items()
+        f"{name}.csv": _comments(folder / f"{name}.csv") + _text(name, grid, separator, decimal)
+        for name, grid in grids.items()
     }
-    _put(folder, texts)
-    return [folder / name for name in texts], [one for one in standing if one not in tables]
+    _put(folder, texts | (others or {}))
+    return [folder / name for name in texts]
 
 
 def _marks(folder, log):
@@ -74,12 +92,16 @@ def _comments(path):
     return "".join(f"{line}\n" for line in _lines(path) if line.startswith("#"))
 
 
-def _text(name, rows, separator, decimal):
-    columns, stream = columns_of(name, rows), io.StringIO()
-    numbers = {field.name for field in CONTRACT[name] if field.kind == "number"}
+def _grid(name, rows):
+    columns = columns_of(name, rows)
+    return [columns, *([row.cells.get(one, "") for one in columns] for row in rows)]
+
+
+def _text(name, grid, separator, decimal):
+    (columns, *rows), stream = grid, io.StringIO()
+    numbers = {field.name for field in COLUMNS[name] if field.kind == "number"}
     written = [columns]
-    for row in rows:
-        cells = [row.cells.get(one, "") for one in columns]
+    for cells in rows:
         if decimal == ",":
             cells = [
                 cell.replace(".", ",") if column in numbers else cell

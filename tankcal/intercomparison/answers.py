@@ -12,7 +12,7 @@ from scipy.stats import norm
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.entries import read_columns, read_section, unknown_section
 from tankcal.job.fields import Field
-from tankcal.job.folder import MAX_SETTINGS_BYTES, csv_marks, read_csv, read_toml
+from tankcal.job.folder import MAX_SETTINGS_BYTES, declared_marks, read_csv, read_toml
 from tankcal.job.tables import SEPARATORS, nearest, read_bytes
 from tankcal.messages import list_some, message
 from tankcal.record.intercomparison import ANSWERS, Answer, AnswersFile, Participant
@@ -213,7 +213,7 @@ def _participant(path, log):
         name: read_section(path.name, name, fields, settings.get(name, {}), sections.get(name), log)
         for name, fields in SECTIONS.items()
     }
-    marks = csv_marks(path.name, settings, log)
+    marks = declared_marks(path.name, settings, log)
     if len(log.problems) > before:
         return None, marks
     values = found["participant"]

@@ -1,12 +1,13 @@
 """From raw tables to values: each key and cell is read as its `Field` says, or told to the log."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tankcal.job.contract import KEYS, KINDS, OPEN_SECTIONS, REGISTER_KEYS, columns_of
 from tankcal.job.contract.registers import FAMILIES, SHORT_KEYS
+from tankcal.job.decimals import settle_decimal
 from tankcal.job.field_values import IN_TOML, NEXT_TO_ZERO, read_value
 from tankcal.job.fields import Field, Refused, is_blank
 from tankcal.job.tables import nearest, shown
@@ -294,9 +295,14 @@ def read_columns(name, table, log, fields=None, kind=None):
     fields  its columns; None: those that the table of this name has in a job of a tank of the kind
     """
     fields = columns_of(name, kind) if fields is None else fields
-    known = [field.name for field in fields]
+    known, told = [field.name for field in fields], ()
+    if table.decimal is not None and not set(table.headings) <= set(known):
+        from tankcal.job.headings import rename_headings  # lists of others alone need its words
+
+        headings, told = rename_headings(table, fields, log)
+        table = replace(table, headings=headings)
     for heading in table.headings:
-        if heading not in known:
+        if heading not in known and heading not in told:
             expected = message(
                 "unknown_column",
                 "unknown column{hint}; expected {known}",
@@ -304,7 +310,7 @@ def read_columns(name, table, log, fields=None, kind=None):
                 known=[*known],
             )
             log.problem(table.file, expected, table.heading_row, heading)
-    columns = {}
+    columns, table = {}, replace(table, decimal=settle_decimal(table, fields, log))
     for field in fields:
         columns[field.name] = None
         if field.name in table.headings:

@@ -9,6 +9,7 @@ import math
 import re
 import unicodedata
 
+from tankcal.job.decimals import has_two_meanings
 from tankcal.job.fields import MAX_TEXT, Field, Refused, is_blank
 from tankcal.job.hints import hint_of_date, hint_of_number, hint_of_text
 from tankcal.job.tables import BadCell, Percent, nearest, shown
@@ -20,6 +21,7 @@ from tankcal.text.numerals import NUMBER
 MAX_LIST = 50  # numbers or pairs
 MAX_NAMES = 5000
 MAX_ROWS = 4000
+IN_LIST = "list"  # in place of a decimal mark: a point, since a comma may separate two numbers
 IN_TOML = "toml"  # in place of a decimal mark: a number is a number, and never a cell
 NEXT_TO_ZERO = 1e-30  # no size, no standard deviation is so small: its square would be nothing
 
@@ -109,7 +111,7 @@ def _number_of_text(field, raw, decimal):
     text = raw.strip(" \t")
     if len(text) > MAX_NAME:
         raise _refused(field, shown(raw))
-    plain = text.replace(",", ".") if decimal != "." else text
+    plain = text.replace(",", ".") if decimal == "," else text
     is_number = NUMBER.fullmatch(plain) is not None
     if decimal in (None, IN_TOML):
         hint = hint_of_text(text, in_cell=decimal is None, name=field.name)
@@ -117,6 +119,9 @@ def _number_of_text(field, raw, decimal):
         raise _refused(field, found, hint)
     if is_number and not (decimal == "," and "." in text):
         return float(plain)
+    other = text.replace(",", ".")
+    if decimal != IN_LIST and NUMBER.fullmatch(other) and not has_two_meanings(text):
+        return float(other)
     if decimal == "." and NUMBER.fullmatch(text.replace(",", ".")):
         hint = message(
             "with_decimal_point",
@@ -267,7 +272,7 @@ def _read_numbers(field, raw, decimal):
             )
         )
     is_text = isinstance(raw, str)
-    mark = "." if is_text else decimal
+    mark = IN_LIST if is_text else decimal
     try:
         return tuple(_read_number(field, part.strip() if is_text else part, mark) for part in parts)
     except Refused as refusal:
@@ -287,7 +292,7 @@ def _read_rows(field, raw, decimal):
         raise _refused(field, shown(raw))
     if not all(isinstance(row, list) and len(row) == field.width for row in rows):
         raise _refused(field, shown(raw))
-    mark = "." if isinstance(raw, str) else decimal
+    mark = IN_LIST if isinstance(raw, str) else decimal
     one = Field(field.name, "number", field.note, low=field.low, high=field.high)
     try:
         return tuple(tuple(_read_number(one, value, mark) for value in row) for row in rows)
@@ -351,6 +356,6 @@ def _read_ranges(field, raw, _decimal):
     is_list = isinstance(pairs, list) and 0 < len(pairs) <= MAX_LIST
     if not is_list or not all(isinstance(pair, list | tuple) and len(pair) == 2 for pair in pairs):
         raise _refused(field, _kind_of(raw))
-    decimal = "." if isinstance(raw, str) else None
+    decimal = IN_LIST if isinstance(raw, str) else None
     number = Field(field.name, "number", field.note, low=0, high=200)
     return tuple(tuple(_read_number(number, end, decimal) for end in pair) for pair in pairs)

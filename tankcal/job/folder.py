@@ -8,6 +8,7 @@ from tankcal.job.tables import (
     COVARIANCE_FILE,
     MAX_FILE_BYTES,
     MAX_PROBLEMS_PER_FILE,
+    NOT_KNOWN,
     RADII_COVARIANCE_FILE,
     REFUSED_FILE,
     REGISTERS,
@@ -24,7 +25,8 @@ from tankcal.job.tables import (
     shown,
 )
 from tankcal.messages import message
-from tankcal.text.decoding import decode_text
+from tankcal.text.decoding import WESTERN, decode_text, is_western
+from tankcal.text.delimited import separator_of_table
 from tankcal.text.spreadsheets import unguard_formula
 
 MAX_SETTINGS_BYTES = 1_000_000
@@ -64,7 +66,7 @@ def read_folder(folder, log, edited=None):
             "no_settings_file", "missing file; every job folder has one{hint}", hint=_hint(names)
         )
         log.problem(SETTINGS_FILE, expected)
-    marks = csv_marks(SETTINGS_FILE, settings or {}, log)
+    marks = declared_marks(SETTINGS_FILE, settings or {}, log)
     tables = {}
     for table in TABLES:
         name = f"{table}.csv"
@@ -150,8 +152,15 @@ def _refuse_unknown_files(names, log):
             )
 
 
-def decode(file, data, log):
-    """The text of a file in UTF-8 or UTF-16, or None after telling `log`."""
+def decode(file, data, log, or_western=False):
+    """The text of a file in UTF-8 or UTF-16, or None after telling `log`.
+
+    or_western  Windows-1252 is also read, with a warning: spreadsheets of western Windows write it
+    """
+    if or_western and is_western(data):
+        said = message("lint_cp1252", "not UTF-8: read with the letters of Windows-1252")
+        log.warning(file, said)
+        return data.decode(WESTERN)
     try:
         text = decode_text(data)
     except UnicodeDecodeError as error:
@@ -366,30 +375,40 @@ def csv_marks(file, settings, log):
     return separator, decimal
 
 
+def declared_marks(file, settings, log):
+    """The same for reading, with NOT_KNOWN where [csv] has no key filled in."""
+    marks = csv_marks(file, settings, log)
+    is_declared = any(value.raw for value in settings.get("csv", {}).values())
+    return marks if marks is None or is_declared else (marks[0], NOT_KNOWN)
+
+
 def read_csv(file, data, separator, decimal, log, settings_file=SETTINGS_FILE):
-    """Table of the bytes of a CSV file, or None after telling `log` why it cannot be read."""
-    text = decode(file, data, log)
+    """Table of the bytes of a CSV file, or None after telling `log` why it cannot be read.
+
+    The separator is recognised by the headings.
+
+    separator  of a file that has one column
+    decimal    as it is declared; NOT_KNOWN: it is not
+    """
+    text = decode(file, data, log, or_western=True)
     if text is None:
         return None
+    separator = separator_of_text(text, separator)
     hint = ""
-    if separator == "," and decimal == ".":
+    if separator == "," and decimal != ",":
         hint = message(
             "for_decimal_commas",
             "; for decimal commas set [csv] separator = ';' and decimal = ',' in {settings_file}",
             settings_file=settings_file,
         )
-    separator = separator_of_blank(text) or separator
-    rows = _csv_rows(file, text, separator, log)
-    return make_table(file, rows, decimal, log, hint, settings_file)
+    if separator == "," and decimal == NOT_KNOWN:
+        decimal = "."  # a decimal comma would have divided the number
+    return make_table(file, _csv_rows(file, text, separator, log), decimal, log, hint)
 
 
-def separator_of_blank(text):
-    """The comma, where nothing was filled in below a heading that `tankcal new` wrote with it."""
-    written = (line.lstrip(' \t"') for line in _lines(text))
-    rows = (line for line in written if line and not line.startswith("#"))
-    heading, more = next(rows, ""), next(rows, None)
-    others = any(mark in heading for mark in SEPARATORS[1:])
-    return SEPARATORS[0] if more is None and SEPARATORS[0] in heading and not others else None
+def separator_of_text(text, usual):
+    """The separator of the text of a CSV file with comments; `usual` where it has one column."""
+    return separator_of_table([line for line in _lines(text) if is_row(line)], usual)
 
 
 def is_row(line):

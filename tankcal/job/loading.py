@@ -6,7 +6,7 @@ from pathlib import Path
 from tankcal.job.building import job_of
 from tankcal.job.folder import read_folder
 from tankcal.job.model import Job
-from tankcal.job.tables import SETTINGS_FILE, Log
+from tankcal.job.tables import SETTINGS_FILE, TABLES, WORKBOOK_FILE, Log
 from tankcal.messages import message
 
 OTHER_WORKBOOKS = (".xls", ".xlsm", ".xlsb", ".xltx", ".ods", ".numbers")
@@ -85,10 +85,36 @@ def _load(path, edited, is_whole):
     return job_of(raw, log, is_whole)
 
 
+def _form_in(folder, log, edited):
+    """The folder, or its workbook where that is the form filled in; None after telling `log`."""
+    book = folder / WORKBOOK_FILE
+    if edited is not None or not book.is_file():
+        return folder
+    if not (folder / SETTINGS_FILE).is_file():
+        ignored = [f"{table}.csv" for table in TABLES if (folder / f"{table}.csv").is_file()]
+        if ignored:
+            text = message(
+                "beside_workbook",
+                "not read: the job of this folder is {book}",
+                book=WORKBOOK_FILE,
+            )
+            log.warning(ignored[0], text)
+        return book
+    from tankcal.job.forms import filled_workbook  # folders of older versions have both
+
+    before = len(log.problems)
+    book = filled_workbook(folder, log)
+    return (book or folder) if len(log.problems) == before else None
+
+
 def _read(path, log, edited):
     """RawJob, or None after telling `log` what `path` is instead of a job."""
     expected = message("expected_job", "expected a job folder, its job.toml or a workbook (.xlsx)")
     try:
+        if path.is_dir():
+            path = _form_in(path, log, edited)
+            if path is None:
+                return None
         if path.is_dir():
             return read_folder(path, log, edited)
         if path.name == SETTINGS_FILE and path.is_file():

@@ -47,6 +47,7 @@ REGISTERS = {  # what each lists
 }
 SETTINGS_FILE = "job.toml"
 SETTINGS_SHEET = "job"
+WORKBOOK_FILE = "job.xlsx"  # of a job folder that is filled in as a workbook
 REFUSED_FILE = "image_points_refused.csv"  # written beside image_points.csv, never read
 COVARIANCE_FILE = "points_cov.npz"
 RADII_COVARIANCE_FILE = "radii_cov.npz"
@@ -54,6 +55,7 @@ RADII_COVARIANCE_FILE = "radii_cov.npz"
 MAX_FILE_BYTES = 200_000_000
 MAX_PROBLEMS_PER_FILE = 50
 SEPARATORS = (",", ";", "\t")
+NOT_KNOWN = "?"  # in place of the decimal mark of a CSV file
 
 
 def shown(value):
@@ -180,8 +182,8 @@ class Table:
     """One table as read: `rows[i]` stands in row `row_numbers[i]` of `file`.
 
     skipped is the number of rows that could not be read (each told as a problem).
-    decimal is the mark that numbers must use when they are text (CSV), or None in a workbook,
-    where a number cell must hold a number.
+    decimal is the mark of numbers in a CSV file as it is declared (NOT_KNOWN: it is not), or None
+    in a workbook, where a number cell must hold a number.
     """
 
     file: str
@@ -302,12 +304,11 @@ def fingerprint(name, data):
     return name, hashlib.sha256(data).hexdigest(), len(data)
 
 
-def make_table(file, numbered_rows, decimal, log, hint="", settings_file=SETTINGS_FILE):
+def make_table(file, numbered_rows, decimal, log, hint=""):
     """Table of (row, cells) pairs, or None; blank rows and rows that start with # are left out.
 
     The first row that remains is the heading. Cells that are None stand for a row that cannot be
-    read, told already. `hint` ends the message about a row of too many cells; `settings_file` says
-    which separator there is.
+    read, told already. `hint` ends the message about a row of too many cells.
     """
     headings, heading_row, rows, numbers, skipped = None, 0, [], [], 0
     for number, raw_cells in numbered_rows:
@@ -321,7 +322,7 @@ def make_table(file, numbered_rows, decimal, log, hint="", settings_file=SETTING
         if not cells or (isinstance(cells[0], str) and cells[0].startswith("#")):
             continue
         if headings is None:
-            headings, heading_row = _headings(file, cells, number, log, settings_file), number
+            headings, heading_row = _headings(file, cells, number, log), number
             if headings is None:
                 return None
         elif len(cells) > len(headings):
@@ -357,23 +358,7 @@ def make_table(file, numbered_rows, decimal, log, hint="", settings_file=SETTING
     return Table(file, headings, heading_row, tuple(rows), tuple(numbers), decimal, skipped)
 
 
-def _headings(file, cells, number, log, settings_file):
-    if len(cells) == 1 and isinstance(cells[0], str):
-        for separator in SEPARATORS:
-            if separator in cells[0]:
-                name = "tab" if separator == "\t" else separator
-                log.problem(
-                    file,
-                    message(
-                        "other_separator",
-                        "the cells are separated by '{name}'; expected the comma, or the "
-                        "separator under [csv] in {settings_file}",
-                        name=name,
-                        settings_file=settings_file,
-                    ),
-                    number,
-                )
-                return None
+def _headings(file, cells, number, log):
     sound = True
     for position, cell in enumerate(cells):
         if not isinstance(cell, str) or not cell:

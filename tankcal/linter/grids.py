@@ -13,12 +13,9 @@ from tankcal.linter.pdf_grids import tables_of_text
 from tankcal.linter.pdf_text import pages_of
 from tankcal.messages import message
 from tankcal.record import FORMAT, version_of
+from tankcal.text.delimited import find_separator
 
 MOST_COLUMNS, MOST_LINES = MAX_COLUMNS, 200_000
-_NOT_OF_TEXT = re.compile(  # control characters, and the marks of UTF-16 and UTF-8
-    rb"[\0-\x08\x0b\x0e-\x1f\x7f]|\A(?:\xff\xfe|\xfe\xff|\xef\xbb\xbf)"
-)
-_BY_CERTAINTY = (";", "\t", ",")  # a comma may be a decimal mark
 
 
 @dataclass(frozen=True)
@@ -55,33 +52,12 @@ def read_grids(path, log):
         return _pdf(path, log)
     if data[:2] == b"PK" or data[:4] == b"\xd0\xcf\x11\xe0" or path.suffix.lower() == ".xlsx":
         return _workbook(path.name, data, log)
-    text = _text(path, data, log)
+    text = decode(path.name, data, log, or_western=path.suffix.lower() != ".json")
     if text is None:
         return ()
     if path.suffix.lower() == ".json" or text.lstrip()[:1] == "{":
         return _record(path.name, text, log)
     return _csv(path.name, text, log)
-
-
-def _text(path, data, log):
-    """Text of UTF-8, or as spreadsheets of western Windows save it; None after telling `log`."""
-    if path.suffix.lower() != ".json" and not _is_utf8(data) and not _NOT_OF_TEXT.search(data):
-        try:
-            text = data.decode("cp1252")
-        except UnicodeDecodeError:
-            return decode(path.name, data, log)
-        said = message("lint_cp1252", "not UTF-8: read with the letters of Windows-1252")
-        log.warning(path.name, said)
-        return text
-    return decode(path.name, data, log)
-
-
-def _is_utf8(data):
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError:
-        return False
-    return True
 
 
 def _pdf(path, log):
@@ -173,7 +149,7 @@ def _csv(file, text, log):
             ),
         )
         return ()
-    separator = max(_BY_CERTAINTY, key=lambda mark: _agreement(lines, mark))
+    separator = find_separator([line for _, line in lines])
     rows = []
     for number, line in lines:
         try:
@@ -203,10 +179,3 @@ def _csv(file, text, log):
         elif any(cell.strip() for cell in cells):
             rows.append((number, tuple(cells)))
     return (Grid(file, tuple(rows), True),)
-
-
-def _agreement(lines, separator):
-    """How many lines have the most frequent number of cells, when that is more than one."""
-    counts = [line.count(separator) for _, line in lines]
-    usual = max(set(counts), key=lambda count: (count > 0, counts.count(count)))
-    return counts.count(usual) if usual > 0 else -1

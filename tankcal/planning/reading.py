@@ -24,7 +24,7 @@ from tankcal.job.entries import (
 from tankcal.job.fields import is_blank
 from tankcal.job.folder import (
     MAX_SETTINGS_BYTES,
-    csv_marks,
+    declared_marks,
     decode,
     flattened,
     parsed_toml,
@@ -148,7 +148,7 @@ def _with_points(raw):
     settings = {name: entries for name, entries in raw.settings.items() if name != "csv"}
     tables = {
         name: replace(table, decimal=".", rows=tuple(map(_in_points, table.rows)))
-        if table is not None and table.decimal == ","
+        if table is not None and table.decimal is not None
         else table
         for name, table in raw.tables.items()
     }
@@ -199,7 +199,7 @@ def _read(folder, log):
     needed = () if is_wall_plan(own) else ("pattern",)
     single = {name: _single(name, own.get(name, {}), rows, log, name in needed) for name in SINGLE}
     repeated = {name: _repeated(name, own.get(name, []), text, log) for name in REPEATED}
-    marks = csv_marks(PLAN_FILE, settings, log)
+    marks = declared_marks(PLAN_FILE, settings, log)
     is_wall = is_wall_plan(own)
     beside = tuple(one for one in JOB_TABLES if one != "control") + WALL_TABLES
     tables, known = {}, [f"{one}.csv" for one in (beside if is_wall else (*JOB_TABLES, *TABLES))]

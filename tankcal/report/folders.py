@@ -23,6 +23,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
+from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE
 from tankcal.messages import message
 from tankcal.record import manifest
 
@@ -34,10 +35,16 @@ NO_EXCHANGE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)  # what a file system 
 
 
 def default_folder(source):
-    """Where the results of a job (a Path) go when nobody says where."""
+    """Where the results of a job (a Path) go by default.
+
+    `results` in a job folder, whichever form it has; NAME-results beside any other NAME.xlsx, since
+    several workbooks may lie in one folder.
+    """
+    if source.name in (SETTINGS_FILE, WORKBOOK_FILE):
+        return source.parent / "results"
     if source.suffix.lower() == ".xlsx":
         return source.with_name(f"{source.stem}-results")
-    return (source.parent if source.name == "job.toml" else source) / "results"
+    return source / "results"
 
 
 def refuse_foreign(directory, known):

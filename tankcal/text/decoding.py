@@ -6,6 +6,7 @@ Editors and spreadsheets write UTF-8 with or without a byte order mark, and UTF-
 
 import codecs
 import json
+import re
 from pathlib import Path
 
 _MARKS = (  # UTF-32 before UTF-16, whose mark begins the mark of UTF-32
@@ -15,6 +16,8 @@ _MARKS = (  # UTF-32 before UTF-16, whose mark begins the mark of UTF-32
     (codecs.BOM_UTF16_LE, "utf-16-le"),
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
+WESTERN = "cp1252"  # Windows-1252
+_NO_WESTERN = re.compile(rb"[\0-\x08\x0b\x0e-\x1f\x7f]")  # control characters that no text has
 _MARK = "\ufeff"  # the byte order mark after decoding
 
 
@@ -53,6 +56,29 @@ def decode_text(data, encoding=None):
     'a,b'
     """
     return data.decode(encoding or find_encoding(data)).lstrip(_MARK)
+
+
+def is_western(data):
+    """Whether bytes are a text in Windows-1252, and in none of the encodings of Unicode.
+
+    Examples
+    --------
+    >>> is_western("posição".encode("cp1252")), is_western("posição".encode())
+    (True, False)
+    """
+    if find_encoding(data) != "utf-8" or data.startswith(_MARKS[0][0]):
+        return False
+    if _can_decode(data, "utf-8") or _NO_WESTERN.search(data):
+        return False
+    return _can_decode(data, WESTERN)
+
+
+def _can_decode(data, encoding):
+    try:
+        data.decode(encoding)
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 def read_json(path):

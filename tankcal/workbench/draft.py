@@ -20,6 +20,7 @@ from tankcal.job.tables import (
     REGISTERS,
     SETTINGS_FILE,
     TABLES,
+    WORKBOOK_FILE,
     Log,
     meant,
     read_beside,
@@ -54,6 +55,8 @@ def source_of(path):
     with suppress(OSError, ValueError):
         if folder.is_dir() and (folder / SETTINGS_FILE).is_file():
             return folder
+        if (folder / WORKBOOK_FILE).is_file():
+            return folder / WORKBOOK_FILE
         if path.suffix.lower() == ".xlsx" and path.is_file():
             return path
     raise InputError(

@@ -7,7 +7,7 @@ What is not edited stays in the file byte for byte.
 import re
 from dataclasses import dataclass, replace
 
-from tankcal.job.folder import is_row, separator_of_blank
+from tankcal.job.folder import is_row, separator_of_text
 from tankcal.text.spreadsheets import guard_formula, unguard_formula
 from tankcal.workbench.decimals import Unwritten
 
@@ -113,7 +113,6 @@ class CsvLines:
     lines    with the line's end of each beside it, in `endings`
     heading  index of the line of headings, None: there is none
     before   headings of that line
-    blank_separator  the one of that line, where it is another and nothing was filled in below
     """
 
     separator: str
@@ -123,7 +122,6 @@ class CsvLines:
     before: tuple[str, ...] = ()
     mark: str = ""
     ending: str = "\n"
-    blank_separator: str | None = None
 
     def render(self, table):
         """(bytes of the file, number of each row)."""
@@ -173,11 +171,7 @@ class CsvLines:
 
     def _heading_of(self, table):
         added = [one for one in table.headings[len(self.before) :] if one]
-        written = (self.lines[self.heading],)
-        is_filled = added or not all(row.is_blank for row in table.rows)
-        if self.blank_separator is not None and is_filled:  # one separator for heading and rows
-            written = map(self._quoted, self.before)
-        return self.separator.join((*written, *map(self._quoted, added)))
+        return self.separator.join((self.lines[self.heading], *map(self._quoted, added)))
 
     def _text_of(self, row):
         if row.line is None:
@@ -206,13 +200,12 @@ def read_csv_table(name, file, text, separator, decimal):
     mark = MARK_OF_ORDER if text.startswith(MARK_OF_ORDER) else ""
     lines, endings = _lines(text.removeprefix(mark))
     heading = next((i for i, line in enumerate(lines) if is_row(line)), None)
-    blank = separator_of_blank(text.removeprefix(mark))
+    separator = separator_of_text(text.removeprefix(mark), separator)
     before = ()
     if heading is not None:
-        before = tuple(cell_of(part) for part in split_line(lines[heading], blank or separator))
+        before = tuple(cell_of(part) for part in split_line(lines[heading], separator))
     ending = next((one for one in endings if one), "\n")
-    other = blank if blank != separator else None
-    origin = CsvLines(separator, lines, endings, heading, before, mark, ending, other)
+    origin = CsvLines(separator, lines, endings, heading, before, mark, ending)
     split = [
         (line, tuple(cell_of(part) for part in split_line(lines[line], separator)))
         for line in (origin.row_lines if heading is not None else ())

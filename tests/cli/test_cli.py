@@ -198,7 +198,7 @@ def test_new_refuses_a_survey_of_another_kind(tmp_path, kind, survey, capsys):
 
 def test_new_writes_a_job_and_refuses_a_full_folder(tmp_path, capsys):
     assert main(["new", str(tmp_path / "mine")]) == 0
-    assert {"job.toml", "points.csv", "courses.csv", "job.xlsx"} <= {
+    assert {"job.toml", "points.csv", "courses.csv"} <= {
         path.name for path in (tmp_path / "mine").iterdir()
     }
     assert main(["new", str(tmp_path / "mine")]) == 2

@@ -14,7 +14,7 @@ from tankcal.errors import InputError, Problem
 from tankcal.job.contract import KEYS
 from tankcal.job.field_values import read_value
 from tankcal.job.fields import Field, Refused
-from tankcal.job.starter import write_starter
+from tankcal.job.starter import write_input_workbook, write_starter
 from tankcal.job.tables import in_book
 from tankcal.messages import Message
 from tankcal.record import record_of
@@ -40,7 +40,8 @@ def plain_terminal(monkeypatch):
 def test_an_empty_form_is_refused_in_its_language(tmp_path, capsys, language, kind):
     write_starter(tmp_path / "job", kind, None, language)
     sheet = {"pt-BR": "planilha", "es": "hoja"}[language]
-    for source in (tmp_path / "job" / "job.xlsx", tmp_path / "job"):
+    book = write_input_workbook(tmp_path / "book" / "job.xlsx", kind, None, language)
+    for source in (book, tmp_path / "job"):
         assert asked_language(source) == language
         assert main(["run", str(source), "--out", str(tmp_path / "out")]) == 2
         lines = [line.partition(": ")[2] for line in capsys.readouterr().err.splitlines()[1:]]

@@ -415,7 +415,7 @@ def test_sheets_that_do_not_belong(tmp_path):
 
 def test_all_problems_of_a_run_come_together(tmp_path):
     parts = full_parts(settings={"tank.id": "../../x", "table.step_m": 0})
-    parts.tables["points"][3][1] = "1,25"
+    parts.tables["points"][3][1] = "1,250"
     parts.tables["points"][5][2] = "NaN"
     parts.tables["courses"][2][2] = -8.0
     parts.tables["uncertainty"][1][2] = "m"

@@ -15,7 +15,7 @@ from written_clouds import some_wall, write_e57
 import tankcal
 from tankcal.errors import InputError
 from tankcal.job.contract.clouds import ASSUMED
-from tankcal.job.starter import write_starter
+from tankcal.job.starter import write_input_workbook, write_starter
 
 
 def small(**given):
@@ -238,7 +238,8 @@ def test_starter_job_of_a_cloud_only_lacks_values(tmp_path):
         write_starter(folder, "vertical", "cloud", language)
         assert (folder / "clouds.toml").exists()
         assert (folder / "scan_targets.csv").exists()
-        for source in (folder, folder / "job.xlsx"):
+        book = write_input_workbook(tmp_path / f"{language}.xlsx", "vertical", "cloud", language)
+        for source in (folder, book):
             with pytest.raises(InputError) as refused:
                 tankcal.load(source)
             assert not any("unknown" in str(one) for one in refused.value.problems)

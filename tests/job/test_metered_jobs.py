@@ -17,7 +17,7 @@ import tankcal
 from tankcal.errors import InputError
 from tankcal.job.checks.sized_volumes import volume_by_sizes
 from tankcal.job.plausibility_table import TABLE
-from tankcal.job.starter import write_starter
+from tankcal.job.starter import write_input_workbook
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words, say
 
@@ -145,8 +145,7 @@ def test_the_form_filled_in_is_the_job(tmp_path, kind, language):
     """Truth: the same job as text files."""
     spoken = {} if language == DEFAULT else {"table__language": language}
     parts = metered_parts(kind, **spoken)
-    write_starter(tmp_path / "form", kind, "liquid", language)
-    book = tmp_path / "form" / "job.xlsx"
+    book = write_input_workbook(tmp_path / "form", kind, "liquid", language)
     fill_form(book, parts.settings, parts.tables)
     filled = openpyxl.load_workbook(book)
     for key, value in METER.items():

@@ -12,7 +12,7 @@ from ringed_jobs import TAPE, ringed_parts
 
 import tankcal
 from tankcal.errors import InputError, TankcalError
-from tankcal.job.starter import write_starter
+from tankcal.job.starter import write_input_workbook
 from tankcal.text.languages import LANGUAGES
 
 
@@ -52,9 +52,8 @@ def test_folder_and_workbook_give_the_same(tmp_path):
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_starter_filled_in_is_the_job(tmp_path, language):
     """The workbook of `tankcal new`, filled in, against the folder of the same job."""
-    write_starter(tmp_path / "new", "horizontal", "strapping", language)
     parts = ringed_parts(laps=("outer", "inner", "outer"))
-    book = tmp_path / "new" / "job.xlsx"
+    book = write_input_workbook(tmp_path / "new", "horizontal", "strapping", language)
     fill_form(book, parts.settings, {name: rows for name, rows in parts.tables.items()})
     _fill_tape(book)
     found = tankcal.load(book)

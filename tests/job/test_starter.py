@@ -25,7 +25,7 @@ from tankcal.job.contract import (
 )
 from tankcal.job.fields import Field
 from tankcal.job.rule_files import LIMITS, RULE, parse_rule, shipped_names
-from tankcal.job.starter import write_starter
+from tankcal.job.starter import write_input_workbook, write_starter
 from tankcal.job.starter.form import DECLARED, METERED, OF_GREAT_CIRCLES, STRAPPED
 from tankcal.job.starter.page import filled_page
 from tankcal.job.tables import Log
@@ -64,7 +64,7 @@ def test_forms_have_the_settings_of_their_kind(tmp_path, kind):
 
 
 def assert_written(starter, kind):
-    names = ["job.toml", "job.xlsx", *(f"{table}.csv" for table in TABLES_OF_KIND[kind])]
+    names = ["job.toml", *(f"{table}.csv" for table in TABLES_OF_KIND[kind])]
     assert sorted(path.name for path in starter.iterdir()) == sorted(names)
     text = (starter / "job.toml").read_text(encoding="utf-8")
     assert f'\nkind = "{kind}"' in text
@@ -99,7 +99,7 @@ def test_a_starter_for_a_survey(tmp_path, survey):
     starter = tmp_path / "starter"
     tables = [*SURVEYS[survey], *TABLES_OF_KIND["vertical"][1:]]
     registers = REGISTERS_OF_SURVEY.get(survey, ())
-    names = ["job.toml", "job.xlsx", *(f"{table}.csv" for table in tables)]
+    names = ["job.toml", *(f"{table}.csv" for table in tables)]
     names += [f"{register}.toml" for register in registers]
     assert sorted(path.name for path in starter.iterdir()) == sorted(names)
     settings = tomllib.loads((starter / "job.toml").read_text(encoding="utf-8"))
@@ -127,7 +127,7 @@ def test_a_starter_for_a_survey(tmp_path, survey):
         fields = columns_of(table, "vertical")
         assert text.splitlines()[-1].split(",") == [field.name for field in fields]
         assert all(f"# {field.name}: {field.note}" in text for field in fields)
-    book = openpyxl.load_workbook(starter / "job.xlsx")
+    book = openpyxl.load_workbook(write_input_workbook(tmp_path / "job.xlsx", survey=survey))
     assert book.sheetnames == ["read me", "job", *registers, *tables, "# inputs"]
 
 
@@ -135,7 +135,7 @@ def test_a_starter_for_a_survey(tmp_path, survey):
 @pytest.mark.parametrize("name", ["", "job.xlsx"])
 @pytest.mark.parametrize("survey", SURVEYS)
 def test_empty_survey_is_reported_as_missing(tmp_path, survey, name):
-    write_starter(tmp_path / "starter", survey=survey)
+    (write_input_workbook if name else write_starter)(tmp_path / "starter", survey=survey)
     with pytest.raises(InputError) as caught:
         load(tmp_path / "starter" / name)
     told = [problem for problem in caught.value.problems if problem.column not in BLANKS]
@@ -192,7 +192,9 @@ def test_a_directory_that_holds_something_is_left_alone(starter, tmp_path):
 
 
 @pytest.mark.parametrize(("name", "kind"), [("", "job.toml"), ("job.xlsx", "sheet job")])
-def test_the_empty_form_has_one_problem_for_each_blank(starter, name, kind):
+def test_the_empty_form_has_one_problem_for_each_blank(tmp_path, name, kind):
+    starter = tmp_path / "starter"
+    (write_input_workbook if name else write_starter)(starter)
     with pytest.raises(InputError) as caught:
         load(starter / name)
     problems = caught.value.problems
@@ -245,8 +247,9 @@ def filled_tables():
 @pytest.mark.slow
 def test_both_forms_filled_in_give_the_same_job(starter):
     assert fill_folder(starter) == len(BLANKS)
-    fill_workbook(starter / "job.xlsx")
-    folder, workbook = load(starter), load(starter / "job.xlsx")
+    book = write_input_workbook(starter.parent / "book.xlsx")
+    fill_workbook(book)
+    folder, workbook = load(starter), load(book)
     assert (folder.points.rows[0], workbook.points.rows[0]) == (12, 10)  # ten comments in the CSV
     assert (folder.tank.id, len(folder.points.names), len(folder.courses)) == ("T-1", 120, 5)
     assert [one.u for one in folder.inputs[:2]] == [5e-6, 1e-3]
@@ -256,8 +259,8 @@ def test_both_forms_filled_in_give_the_same_job(starter):
     assert_same_job(folder, workbook)
 
 
-def test_the_workbook_helps_to_fill_it_in(starter):
-    book = openpyxl.load_workbook(starter / "job.xlsx")
+def test_the_workbook_helps_to_fill_it_in(tmp_path):
+    book = openpyxl.load_workbook(write_input_workbook(tmp_path / "job.xlsx"))
     tables = ["points", "courses", "welds", "bottom", "deadwood", "uncertainty"]
     tables += ["correlations", "stated", "overrulings"]
     assert book.sheetnames == ["read me", "job", *tables, "# inputs"]
@@ -384,7 +387,8 @@ def test_forms_have_the_sizes_of_the_drawing(tmp_path, language, kind):
     """What tells a slip of the hand: diameter, height and volume, in text and in the workbook."""
     folder = write_starter_in(tmp_path / "job", kind, None, language)
     settings = tomllib.loads((folder / "job.toml").read_text(encoding="utf-8"))
-    sheet = openpyxl.load_workbook(folder / "job.xlsx", read_only=True)["job"]
+    book = write_input_workbook(tmp_path / "job.xlsx", kind, None, language)
+    sheet = openpyxl.load_workbook(book, read_only=True)["job"]
     in_book = {cell for row in sheet.iter_rows(values_only=True) for cell in row}
     for key in ("nominal_diameter_m", "nominal_height_m", "nominal_volume_m3"):
         assert key in settings["tank"]

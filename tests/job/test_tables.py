@@ -49,14 +49,13 @@ def test_spaces_before_quotation_marks_are_ignored():
         (b"", None, "empty"),
         (b"\n,,\n# only a comment\n", None, "empty"),
         (b"a,b\n1,\0\n", 2, "zero byte"),
-        ("a,b\n1,2\né,3\n".encode("latin-1"), 3, "not UTF-8"),
+        ("a,b\n1,2\né,\x01\n".encode("latin-1"), 3, "not UTF-8"),
         ("a,b\n".encode("utf-16")[:-1], 1, "not UTF-8"),
         (b'a,b\n"1,2\n3,4\n', 2, "quotation marks"),
         (b"a,b\n1,2\n3\n", 3, "1 cells, expected 2"),
         (b"a,b\n1,2,3\n", 2, "3 cells, expected 2 as in the heading; for decimal commas"),
         (b"a,b,a\n1,2,3\n", 1, "is given twice"),
         (b"a,,b\n1,2,3\n", 1, "column 2 has no heading"),
-        (b"a;b\n1;2\n", 1, "separated by ';'"),
     ],
 )
 def test_unreadable_csv_files(data, row, words):
@@ -156,6 +155,11 @@ NUMBER = Field("x_m", "number", "", low=-1e6, high=1e6)
         (" -.5e1 ", ".", -5.0),
         ("+7.", ".", 7.0),
         ("12", ",", 12.0),
+        ("1,25", ".", 1.25),
+        ("1.25", ",", 1.25),
+        ("-0,234", ".", -0.234),
+        ("1234.567", ",", 1234.567),
+        ("1,234", ",", 1.234),
     ],
 )
 def test_numbers_as_text(text, decimal, value):
@@ -165,8 +169,8 @@ def test_numbers_as_text(text, decimal, value):
 @pytest.mark.parametrize(
     ("text", "decimal", "words"),
     [
-        ("1,25", ".", "[csv] decimal"),
-        ("1.25", ",", "with a decimal comma"),
+        ("1,250", ".", "[csv] decimal"),
+        ("1.250", ",", "with a decimal comma"),
         ("1.000,5", ",", "expected a number"),
         ("1_000", ".", "expected a number"),
         ("１２", ".", "expected a number"),
@@ -388,12 +392,15 @@ def test_a_heading_of_commas_with_nothing_below_is_read_in_a_job_of_semicolons(d
     assert (table.headings, table.rows) == (("a", "b"), ())
 
 
-def test_rows_below_a_heading_of_commas_are_not_guessed_at():
+@pytest.mark.parametrize(
+    ("data", "declared"), [(b"a,b\n1,2\n", (";", ",")), (b"a;b\n1;2\n", (",", "."))]
+)
+def test_the_heading_says_which_separator_there_is(data, declared):
     log = Log()
-    assert read_csv("t.csv", b"a,b\n1,2\n", ";", ",", log) is None
-    assert "separated by ','" in str(log.problems[0])
+    table = read_csv("t.csv", data, *declared, log)
+    assert (table.headings, table.rows, log.problems) == (("a", "b"), (("1", "2"),), [])
 
 
-def test_a_heading_of_semicolons_alone_stays_one_where_commas_are_declared():
-    log = Log()
-    assert read_csv("t.csv", b"a;b\n", ",", ".", log) is None
+def test_a_list_in_a_cell_is_no_separator():
+    table, problems = csv_table('a,b\n"1; 2; 3",4\n"5; 6; 7",8\n')
+    assert (problems, table.rows) == ([], (("1; 2; 3", "4"), ("5; 6; 7", "8")))

@@ -316,3 +316,7 @@ KEYS = {
     "certificate": CERTIFICATE,
     "csv": CSV,
 }
+
+# what forms of these surveys have beforehand, in place of `start`
+STARTS_OF_STRAPPING = {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
+STARTS_OF_LIQUID = {"survey.side": "inside", "datum.bottom_z_m": "0.0"}  # of upright tanks

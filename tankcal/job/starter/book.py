@@ -1,6 +1,7 @@
 """The input workbook: a cover, a sheet of settings, and a sheet for each table and list."""
 
 import datetime
+import io
 
 import xlsxwriter
 
@@ -90,10 +91,10 @@ def write_inputs(sheet, form, texts, look):
 _NO_DAY = datetime.datetime(2000, 1, 1)  # the same form gives the same bytes
 
 
-def write_book(path, form):
-    """Write the empty workbook of a Form."""
-    texts = texts_in(form.language)
-    with xlsxwriter.Workbook(path) as book:
+def book_bytes(form):
+    """The empty workbook of a Form as bytes."""
+    texts, data = texts_in(form.language), io.BytesIO()
+    with xlsxwriter.Workbook(data) as book:
         book.set_properties({"title": texts.of("cover", "title"), "created": _NO_DAY})
         look = Look(book)
         write_cover(book.add_worksheet(texts.of("cover", "name")), form, texts, look)
@@ -106,6 +107,7 @@ def write_book(path, form):
         for table in form.tables:
             write_table(book.add_worksheet(table), table, form, texts, look)
         write_inputs(book.add_worksheet(texts.of("cover", "inputs_name")), form, texts, look)
+    return data.getvalue()
 
 
 def _sections(form, texts):

@@ -13,6 +13,7 @@ from tankcal.job.contract import (
     TABLES_OF_KIND,
     tables_of_survey,
 )
+from tankcal.job.contract.keys import STARTS_OF_LIQUID, STARTS_OF_STRAPPING
 from tankcal.job.contract.radii import KEYS as OF_RADII
 from tankcal.job.contract.uncertainty import UNITS
 from tankcal.job.fields import Field
@@ -22,9 +23,8 @@ STRAPPED = ("strapping", "reference-line")  # surveys that are not adjusted as p
 METERED = "liquid"  # a survey of every kind of tank
 DECLARED = "radii"  # no survey, but what a former table, a record or somebody says
 OF_SHELLS = (*STRAPPED, "wall-hits", "tangents", DECLARED)  # upright, or SURVEYS_OF_KIND
-STARTS_OF_STRAPPING = {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
-STARTS_OF_LIQUID = {"survey.side": "inside", "datum.bottom_z_m": "0.0"}  # of upright tanks
 OF_GREAT_CIRCLES = (("sphere", "ovality_mm"), ("sphere", "form_mm"))
+DECIMAL_COMMAS = {"separator": ";", "decimal": ","}  # as spreadsheets in these languages write CSV
 PLACEHOLDER = "NAME"  # of a camera or an instrument
 
 
@@ -86,6 +86,8 @@ class Form:
             return self.kind
         if (section, field.name) == ("table", "language") and self.language != DEFAULT:
             return self.language
+        if section == "csv" and self.language != DEFAULT:
+            return DECIMAL_COMMAS[field.name]
         if self.survey == "tangents" and (section, field.name) == ("survey", "side"):
             return "outside"
         if self.survey in (METERED, DECLARED) and self.kind == "vertical":

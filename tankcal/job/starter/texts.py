@@ -8,50 +8,13 @@ from dataclasses import dataclass
 
 from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
 from tankcal.job.fields import MAX_TEXT
-from tankcal.text.digits import shortest, superscript
+from tankcal.text.digits import shortest
 from tankcal.text.form_words import word_of
 from tankcal.text.languages import DEFAULT
 from tankcal.text.naming import MAX_NAME
 from tankcal.text.numerals import NUMBER
+from tankcal.text.unit_endings import parted
 from tankcal.text.words import load_words, marks_of
-
-# The unit that the name of a key or column ends with, and what is a number.
-
-_UNITS = {
-    "_mm_per_m": "mm/m",
-    "_m3_per_m": "m³/m",
-    "_m3_h": "m³/h",
-    "_kg_m3": "kg/m³",
-    "_per_k": "1/K",
-    "_arcsec": "″",
-    "_deg": "°",
-    "_gon": "gon",
-    "_dms": "° ′ ″",
-    "_ppm": "ppm",
-    "_gpa": "GPa",
-    "_m3": "m³",
-    "_bar": "bar",
-    "_mm2": "mm²",
-    "_mm": "mm",
-    "_um": "µm",
-    "_px": "px",
-    "_kg": "kg",
-    "_c": "°C",
-    "_n": "N",
-    "_l": "L",
-    "_m": "m",
-}
-
-
-def parted(name):
-    """(name without its unit, unit): ("height", "m") of height_m, ("K1", "mm⁻²") of K1_mm-2."""
-    stem, power = name.rpartition("_mm-")[::2]
-    if stem:
-        return stem, f"mm{superscript('-' + power)}"
-    for ending, unit in _UNITS.items():
-        if name.endswith(ending):
-            return name.removesuffix(ending), unit
-    return name, ""
 
 
 def is_number(text):

@@ -9,13 +9,16 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.job.contract import columns_of
-from tankcal.job.starter.book import write_book
+from tankcal.job.contract.keys import CSV
+from tankcal.job.starter.book import book_bytes
 from tankcal.job.starter.form import Form
 from tankcal.job.starter.texts import is_number, texts_in
-from tankcal.job.tables import SETTINGS_FILE
+from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE
 from tankcal.messages import message
 from tankcal.text.languages import DEFAULT
 from tankcal.text.words import say
+
+KEPT = ("field-sheets.pdf",)  # may lie in the folder when its form is written again
 
 # A starter job that has something in it already: what a plan knows before the survey.
 
@@ -132,11 +135,16 @@ def csv_text(table, form):
         lines.append(f"# {field.name}: {texts.note('columns', table, field)}{blank}")
     if table == "uncertainty":
         lines += [_input(texts, name, one) for name, one in form.inputs.items()]
-    names = [field.name for field in fields]
+    separator, decimal = (form.start("csv", field) for field in CSV)
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerows([row.get(name, "") for name in names] for row in form.rows(table))
-    return "\n".join([*lines, ",".join(names)]) + "\n" + text.getvalue()
+    writer = csv.writer(text, delimiter=separator, lineterminator="\n")
+    writer.writerow(field.name for field in fields)
+    for row in form.rows(table):
+        cells = [(field, row.get(field.name, "")) for field in fields]
+        writer.writerow(
+            cell.replace(".", decimal) if field.kind == "number" else cell for field, cell in cells
+        )
+    return "\n".join(lines) + "\n" + text.getvalue()
 
 
 def _note(texts, field, text, is_to_fill_in):
@@ -153,20 +161,26 @@ def _input(texts, name, declarable):
     return f"# {name}: {texts.input_note(name, declarable)}, {declarable.unit}{ending}"
 
 
-WORKBOOK_FILE = "job.xlsx"
-
-
 def write_starter(directory, kind="vertical", survey=None, language=DEFAULT):
-    """Write the starter job of a kind of tank into `directory`, made when it does not exist.
+    """Write the starter job of a kind of tank as text files into `directory`.
 
     kind      "vertical", "horizontal", "sphere" or "mesh"; only what it can use is written
     survey    "photos" or "total-station": its files in place of the points; None: points
-    language  of the papers that the job asks for, and of the workbook's explanations
+    language  of the papers that the job asks for, and of the explanations
 
-    Raises InputError when the directory holds something already or cannot be written, ValueError
+    The directory is made when it does not exist. An untouched starter workbook in it, as
+    `write_input_workbook` makes it, is replaced: a folder holds one form.
+
+    Raises InputError when the directory holds something else or cannot be written, ValueError
     for another kind, another survey, or a survey of a mesh.
     """
-    write_form(directory, Form(kind, survey, language))
+    form, directory = Form(kind, survey, language), Path(directory)
+    try:
+        book = _make_empty(directory, lambda: {WORKBOOK_FILE: book_bytes(form)})
+        _write_texts(directory, form)
+        _remove(book)
+    except OSError as error:
+        raise _unwritten(directory, error) from error
 
 
 def write_form(directory, form):
@@ -174,13 +188,8 @@ def write_form(directory, form):
     directory = Path(directory)
     try:
         _make_empty(directory)
-        (directory / SETTINGS_FILE).write_text(settings_text(form), encoding="utf-8")
-        for table in form.tables:
-            (directory / f"{table}.csv").write_text(csv_text(table, form), encoding="utf-8")
-        for register in form.registers:
-            path = directory / f"{register}.toml"
-            path.write_text(register_text(register, form), encoding="utf-8")
-        write_book(directory / WORKBOOK_FILE, form)
+        _write_texts(directory, form)
+        (directory / WORKBOOK_FILE).write_bytes(book_bytes(form))
     except OSError as error:
         raise _unwritten(directory, error) from error
 
@@ -188,14 +197,15 @@ def write_form(directory, form):
 def write_input_workbook(path, kind="vertical", survey=None, language=DEFAULT):
     """Write the starter job as a workbook alone; returns its Path.
 
-    path  of a workbook (.xlsx) that does not exist yet, or of a folder: job.xlsx in it
+    path  of a workbook (.xlsx) that does not exist yet, or of a folder: job.xlsx in it, in place
+          of untouched text files that `write_starter` made of the same form
 
     The rest as `write_starter` has it.
     """
-    form, path = Form(kind, survey, language), Path(path)
+    form, path, texts = Form(kind, survey, language), Path(path), []
     try:
         if path.suffix.lower() != ".xlsx":
-            _make_empty(path)
+            texts = _make_empty(path, lambda: _text_files(form))
             path = path / WORKBOOK_FILE
         elif path.exists():
             raise InputError(
@@ -205,17 +215,54 @@ def write_input_workbook(path, kind="vertical", survey=None, language=DEFAULT):
                 )
             )
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_book(path, form)
+        path.write_bytes(book_bytes(form))
+        _remove(texts)
     except OSError as error:
         raise _unwritten(path, error) from error
     return path
 
 
-def _make_empty(directory):
-    if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
-        found = "is not empty" if directory.is_dir() else "is a file"
-        raise InputError(Problem(directory.name, f"{found}; expected a new or empty directory"))
+def _text_files(form):
+    """{name: bytes} of the text files of a Form."""
+    texts = {SETTINGS_FILE: settings_text(form)}
+    texts |= {f"{table}.csv": csv_text(table, form) for table in form.tables}
+    texts |= {f"{register}.toml": register_text(register, form) for register in form.registers}
+    return {name: text.encode() for name, text in texts.items()}
+
+
+def _write_texts(directory, form):
+    for name, data in _text_files(form).items():
+        (directory / name).write_bytes(data)
+
+
+def _make_empty(directory, replaceable=None):
+    """Make a directory, or check that it has no files of the user; returns those to replace.
+
+    replaceable  makes {name: bytes} of the form whose files may be there, unchanged
+    """
+    if directory.exists() and not directory.is_dir():
+        text = message("new_is_file", "is a file; expected the name of a new or empty folder")
+        raise InputError(Problem(directory.name, text))
+    found = sorted(directory.iterdir()) if directory.exists() else []
+    of_form = [one for one in found if one.name not in KEPT]
+    written = replaceable() if of_form and replaceable else {}
+    if (found and not written) or not all(_is_untouched(one, written) for one in of_form):
+        text = message(
+            "new_not_empty",
+            "is not empty, and is left as it is; expected the name of a new or empty folder",
+        )
+        raise InputError(Problem(directory.name, text))
     directory.mkdir(parents=True, exist_ok=True)
+    return of_form
+
+
+def _is_untouched(path, written):
+    return path.name in written and path.is_file() and path.read_bytes() == written[path.name]
+
+
+def _remove(paths):
+    for path in paths:
+        path.unlink()
 
 
 def _unwritten(path, error):

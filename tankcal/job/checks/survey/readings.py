@@ -138,7 +138,8 @@ def check_angle(files, table, angle, *, is_needed=True):
     """One of the units in each row, a column of one unit at least; not needed: at most one."""
     columns = [f"{angle}_{unit}" for unit in ANGLE_UNITS]
     wanted = join_with_or(columns)
-    headings = files.raw.tables[files_name(table)].headings
+    filled = [name for name, values in table.columns.items() if values is not None]
+    headings = {*files.raw.tables[files_name(table)].headings, *filled}  # foreign ones by column
     if not any(column in headings for column in columns):
         if not is_needed:
             return

@@ -1,0 +1,236 @@
+"""A technician's own list (CSV) as a table of a job: foreign headings, units and marks."""
+
+import json
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from tankcal.fieldbooks.writing import refuse_standing, tables_with_rows, write_grids
+from tankcal.job.contract import COLUMNS
+from tankcal.job.decimals import has_two_meanings, settle_decimal
+from tankcal.job.entries import read_columns
+from tankcal.job.fields import is_blank
+from tankcal.job.folder import declared_marks, parsed_toml, read_csv, read_toml
+from tankcal.job.headings import Meaning, meanings_of, stated_meaning
+from tankcal.job.tables import NOT_KNOWN, SETTINGS_FILE, Log, Table, nearest, read_bytes
+from tankcal.messages import message
+from tankcal.text.naming import MAX_NAME
+from tankcal.text.numerals import NUMBER
+
+MEMORY_FILE = "headings.toml"  # in the job folder: what the headings of earlier lists meant
+MOST_DECIMALS = 9  # of a converted length, in the unit of the column
+MAX_BYTES = 50_000_000
+
+
+@dataclass
+class ForeignList:
+    """A list as read, and what its headings mean.
+
+    Attributes
+    ----------
+    name : str
+        Table of the job that it becomes.
+    table : Table
+        As read; its decimal mark is that of the list.
+    meanings : dict of Meaning
+        By heading; others are not used.
+    warnings : tuple of Problem
+        Of the reading, such as another encoding.
+    """
+
+    name: str
+    table: Table
+    meanings: dict
+    warnings: tuple = ()
+
+    @property
+    def unused(self):
+        """Headings without a meaning."""
+        return [one for one in self.table.headings if one not in self.meanings]
+
+    @property
+    def missing(self):
+        """Fields that every row needs and that no heading means."""
+        found = {one.column for one in self.meanings.values()}
+        return [one for one in COLUMNS[self.name] if one.required and one.name not in found]
+
+
+def is_table(name):
+    """Whether a job has a table of this name."""
+    return name in COLUMNS
+
+
+def read_list(path, folder, name="points", given=None):
+    """ForeignList of a CSV file for a table of the job in a folder.
+
+    Parameters
+    ----------
+    path, folder : Path
+    name : str
+    given : dict, optional
+        {heading: column} as the user states it; the rest is recognised or remembered.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or a heading or column of `given` does not exist.
+    """
+    log, fields = Log(), COLUMNS[name]
+    data = read_bytes(path, log, MAX_BYTES)
+    decimal = _declared_decimal(folder, log)
+    table = None if data is None else read_csv(path.name, data, ",", decimal, log)
+    log.stop_if_problems()
+    stated = _remembered(folder, name, log) | (given or {})
+    stated = {head: column for head, column in stated.items() if head in table.headings}
+    for heading, column in (given or {}).items():
+        _check_given(heading, column, table, fields, log)
+    log.stop_if_problems()
+    taken = set(stated.values())
+    free = [field for field in fields if field.name not in taken]
+    headings = [one for one in table.headings if one not in stated]
+    own = {one: Meaning(one, Fraction(1)) for one in headings if one in _names(free)}
+    rest = [one for one in headings if one not in own]
+    free = [field for field in free if field.name not in own]
+    found = {head: one for head, one in meanings_of(rest, free).items() if one.factor is not None}
+    found |= own | {head: _stated(head, column, fields) for head, column in stated.items()}
+    meanings = {one: found[one] for one in table.headings if one in found}
+    return ForeignList(name, table, meanings, tuple(log.warnings))
+
+
+def _names(fields):
+    return {field.name for field in fields}
+
+
+def _stated(heading, column, fields):
+    """The Meaning that a user states, with the factor of the unit that the heading has."""
+    [field] = [one for one in fields if one.name == column]
+    return stated_meaning(heading, field)
+
+
+def _check_given(heading, column, table, fields, log):
+    names = [field.name for field in fields]
+    if heading not in table.headings:
+        text = message(
+            "list_no_heading",
+            "no heading {heading!r}; expected one of {headings}",
+            heading=heading,
+            headings=[*table.headings],
+        )
+        log.problem(table.file, text, table.heading_row)
+    if column not in names:
+        text = message(
+            "list_no_column",
+            "no column {column!r}{hint}; expected one of {names}",
+            column=column,
+            hint=nearest(column, names),
+            names=names,
+        )
+        log.problem("--column", text)
+
+
+def _declared_decimal(folder, log):
+    path = folder / SETTINGS_FILE
+    data = read_bytes(path, log) if path.is_file() else None
+    settings = None if data is None else read_toml(SETTINGS_FILE, data, Log())[0]
+    marks = declared_marks(SETTINGS_FILE, settings or {}, Log())
+    return NOT_KNOWN if marks is None else marks[1]
+
+
+def _remembered(folder, name, log):
+    """{heading: column} of earlier lists for a table."""
+    path = folder / MEMORY_FILE
+    data = read_bytes(path, log) if path.is_file() else None
+    parsed = None if data is None else parsed_toml(MEMORY_FILE, data, log)
+    section = {} if parsed is None else parsed[0].get(name, {})
+    columns = {field.name for field in COLUMNS[name]}
+    section = section if isinstance(section, dict) else {}
+    return {heading: one for heading, one in section.items() if one in columns}
+
+
+def refuse_missing(found):
+    """Raise InputError, with one problem for each column that a ForeignList lacks."""
+    log = Log()
+    for field in found.missing:
+        text = message(
+            "list_lacks_column",
+            "no heading means {column} ({note}); expected --column 'HEADING={column}', where "
+            "HEADING is one of {headings}",
+            column=field.name,
+            note=field.expectation(),
+            headings=found.unused or [*found.table.headings],
+        )
+        log.problem(found.table.file, text, found.table.heading_row)
+    log.stop_if_problems()
+
+
+def write_list(found, folder, *, replace=False):
+    """Write a ForeignList as a table of the job, and remember its headings; returns the paths.
+
+    Raises InputError with every problem of its values; nothing is written then.
+    """
+    folder, log = Path(folder), Log()
+    refuse_missing(found)
+    standing = [] if replace else tables_with_rows(folder, [found.name])
+    refuse_standing(folder, standing)
+    table = _in_columns(found, log)
+    log.stop_if_problems()
+    read_columns(found.name, table, log)
+    log.stop_if_problems()
+    rows = [["" if cell is None else cell for cell in row] for row in table.rows]
+    memory = {MEMORY_FILE: _memory_text(found, folder)}
+    return write_grids(folder, {found.name: [table.headings, *rows]}, memory)
+
+
+def _in_columns(found, log):
+    """The Table with the columns of the job, decimal points, and lengths in their units."""
+    table = found.table
+    fields = {field.name: field for field in COLUMNS[found.name]}
+    used = [(place, found.meanings[one]) for place, one in enumerate(table.headings)
+            if one in found.meanings]  # fmt: skip
+    headings = tuple(one.column for _, one in used)
+    rows = [tuple(row[place] for place, _ in used) for row in table.rows]
+    plain = Table(table.file, headings, table.heading_row, tuple(rows), table.row_numbers,
+                  table.decimal, table.skipped)  # fmt: skip
+    decimal = settle_decimal(plain, [*fields.values()], log)
+    kinds = [fields[one.column].kind for _, one in used]
+    rows = tuple(
+        tuple(
+            _converted(cell, one.factor, decimal) if kind == "number" else cell
+            for cell, kind, (_, one) in zip(row, kinds, used, strict=True)
+        )
+        for row in rows
+    )
+    return Table(table.file, headings, table.heading_row, rows, table.row_numbers, ".",
+                 table.skipped)  # fmt: skip
+
+
+def _converted(cell, factor, decimal):
+    """A number with a decimal point in the unit of its column; other texts as they are."""
+    if is_blank(cell):
+        return cell
+    text = cell.strip(" \t")
+    if ("," in text and "." in text) or len(text) > MAX_NAME:
+        return cell
+    plain = text.replace(",", ".")
+    if not NUMBER.fullmatch(plain) or (has_two_meanings(text) and decimal not in text):
+        return cell
+    if factor == 1:
+        return plain
+    value = f"{float(Fraction(plain) * factor):.{MOST_DECIMALS}f}"
+    return value.rstrip("0").rstrip(".")
+
+
+def _memory_text(found, folder):
+    """headings.toml with what the headings of this list and of earlier lists mean."""
+    path = folder / MEMORY_FILE
+    kept = {}
+    if path.is_file():
+        parsed = parsed_toml(MEMORY_FILE, path.read_bytes(), Log())
+        kept = {name: one for name, one in (parsed or ({},))[0].items() if is_table(name)}
+    now = {heading: one.column for heading, one in found.meanings.items()}
+    kept[found.name] = kept.get(found.name, {}) | now
+    lines = []
+    for name, headings in kept.items():
+        lines += [f"[{name}]", *(f"{json.dumps(head, ensure_ascii=False)} = {json.dumps(column)}"
+                                 for head, column in headings.items()), ""]  # fmt: skip
+    return "\n".join(lines)
