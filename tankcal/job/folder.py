@@ -4,6 +4,7 @@ import csv
 import re
 import tomllib
 
+from tankcal.errors import reason_of
 from tankcal.job.tables import (
     COVARIANCE_FILE,
     MAX_FILE_BYTES,
@@ -31,7 +32,41 @@ MAX_SETTINGS_LINE = 4000  # characters
 DECIMALS = (".", ",")
 OF_INSPECTIONS = ("settlement.csv", "edge_profiles.csv")  # beside a job, no part of it
 _LONGEST_START = 100_000  # bytes, of comments before a heading
-_TWICE = ("Cannot overwrite", "Cannot declare", "Cannot redefine")  # as tomllib begins these
+_TWICE = message("toml_given_twice", "a key or a section is given twice")
+_BROKEN_TEXT = message(
+    "toml_text_broken", "a text without its closing quotation mark, or with a control character"
+)
+_ESCAPE = message(
+    "toml_escape",
+    "a backslash in a text between double quotation marks; write two of them, or put the text "
+    "between single ones",
+)
+_TOML_REASONS = {  # {how tomllib begins a reason: the reason in our words}
+    "Cannot overwrite": _TWICE,
+    "Cannot declare": _TWICE,
+    "Cannot redefine": _TWICE,
+    "Cannot mutate": _TWICE,
+    "Duplicate inline": _TWICE,
+    "Invalid statement": message("toml_statement", "a line without a key"),
+    "Expected newline": message("toml_two_values", "text behind the value that is no # comment"),
+    "Expected '=' after": message("toml_no_equals", "a key without = behind it"),
+    "Expected ']": message("toml_no_bracket", "a section whose name has no closing ]"),
+    "Invalid initial": message("toml_no_key", "a key or a name without letters, digits, _ or -"),
+    "Unclosed array": message("toml_list_open", "a list without its closing ], or without a comma"),
+    "Unclosed inline": message("toml_table_open", "an inline table without its end or a comma"),
+    "Unterminated string": _BROKEN_TEXT,
+    "Illegal character": _BROKEN_TEXT,
+    "Found invalid": _BROKEN_TEXT,
+    "Expected ": _BROKEN_TEXT,  # its quotation mark
+    "Unescaped": _ESCAPE,
+    "Invalid hex": _ESCAPE,
+    "Escaped character": _ESCAPE,
+    "Invalid date": message("toml_no_date", "a date or a time that does not exist"),
+    "Invalid value": message(
+        "toml_value", "a value that is no number, date, list, true or false; a text needs "
+        "quotation marks",
+    ),
+}  # fmt: skip
 _DECIMAL_COMMA = re.compile(
     r"(\s*[\w.\"'-]+\s*=\s*[+-]?\d+),(\d+(?:[eE][+-]?\d+)?)\s*(?:#.*)?", re.DOTALL
 )
@@ -107,7 +142,7 @@ def _names_in(folder, log):
             message(
                 "folder_cannot_be_read",
                 "the folder cannot be read ({strerror})",
-                strerror=error.strerror,
+                strerror=reason_of(error),
             ),
         )
         return []
@@ -302,9 +337,8 @@ def _reason(error):
     if isinstance(error, RecursionError):
         return message("too_deep", "too deeply nested")
     reason = re.sub(r"\s*\(at .*\)$", "", str(error))
-    if reason.startswith(_TWICE):
-        return message("toml_given_twice", "a key or a section is given twice")
-    return reason
+    known = (said for start, said in _TOML_REASONS.items() if reason.startswith(start))
+    return next(known, reason)
 
 
 def _toml_rows(text):

@@ -16,7 +16,7 @@ import warnings
 from urllib.parse import urlsplit
 
 import tankcal
-from tankcal.errors import InputError, Problem, TankcalError
+from tankcal.errors import InputError, Problem, TankcalError, reason_of
 from tankcal.messages import message
 
 OPTION = "--cluster"
@@ -209,7 +209,7 @@ def _no_answer(address, error):
             "no scheduler of dask answers at {address} ({reason}); expected such as "
             "tcp://192.168.1.20:8786, where `dask scheduler` runs",
             address=str(address),
-            reason=getattr(error, "strerror", None) or type(error).__name__,
+            reason=reason_of(error),
         )
     )
 

@@ -31,6 +31,7 @@ from tankcal.job.folder import (
     read_csv,
 )
 from tankcal.job.folder import read_register as read_register_file
+from tankcal.job.loading import saved_file_in
 from tankcal.job.measuring import make_measurements
 from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import (
@@ -174,6 +175,12 @@ def _folder(path, log):
             file=PLAN_FILE,
             same=PLAN_FILE,
         )
+        if saved := saved_file_in(path):
+            expected = message(
+                "results_as_plan",
+                "holds results ({saved}), not a plan; expected a plan's folder, or its {file}",
+                saved=saved, file=PLAN_FILE,
+            )  # fmt: skip
         log.problem(path.name or ".", expected)
     return path
 

@@ -66,6 +66,10 @@ FORM_WORDS = {
         "level": ("nível",),
         "plummet": ("prumo",),
         "stadia": ("estádia",),
+        "before": ("antes",),
+        "after": ("depois",),
+        "rust": ("ferrugem",),
+        "paint": ("pintura",),
     },
     "es": {
         YES: ("sí", "verdadero"),
@@ -125,6 +129,10 @@ FORM_WORDS = {
         "level": ("nivel",),
         "plummet": ("plomada",),
         "stadia": ("estadia",),
+        "before": ("antes",),
+        "after": ("después",),
+        "rust": ("óxido",),
+        "paint": ("pintura",),
     },
 }
 

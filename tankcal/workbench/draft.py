@@ -15,7 +15,7 @@ from pathlib import Path
 from tankcal.errors import InputError, Problem
 from tankcal.job.contract import COLUMNS, KINDS, columns_of
 from tankcal.job.folder import csv_marks, decode, parsed_toml, read_toml
-from tankcal.job.loading import load_edited
+from tankcal.job.loading import load_edited, results_given_as_job
 from tankcal.job.tables import REGISTERS, SETTINGS_FILE, TABLES, Log, meant, read_bytes
 from tankcal.messages import message
 from tankcal.text.decoding import decode_text, find_encoding
@@ -48,16 +48,12 @@ def source_of(path):
             return folder
         if path.suffix.lower() == ".xlsx" and path.is_file():
             return path
-    raise InputError(
-        Problem(
-            path.name or str(path),
-            message(
-                "no_job_to_open",
-                "no job there; expected a folder with job.toml or a workbook (.xlsx), such as "
-                "tankcal new writes",
-            ),
-        )
+    no_job = message(
+        "no_job_to_open",
+        "no job there; expected a folder with job.toml or a workbook (.xlsx), such as tankcal new "
+        "writes",
     )
+    raise InputError(Problem(path.name or str(path), results_given_as_job(path) or no_job))
 
 
 class Draft:

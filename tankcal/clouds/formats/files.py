@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tankcal.clouds.contents import CloudPiece
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, reason_of
 from tankcal.messages import message
 
 TEXT_ENDINGS = (".ptx", ".pts", ".xyz", ".asc", ".txt", ".csv")
@@ -84,7 +84,7 @@ def open_cloud(path):
             with path.open("rb") as stream:
                 start = stream.read(SNIFFED)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
+        reason = reason_of(error)
         unreadable = message("cloud_file_unreadable", "cannot be read: {reason}", reason=reason)
         raise InputError(Problem(path.name or str(path), unreadable)) from error
     if not is_regular:
