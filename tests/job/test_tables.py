@@ -85,7 +85,7 @@ def test_settings_know_their_rows():
 @pytest.mark.parametrize(
     ("text", "row", "words"),
     [
-        ("[tank]\nid = T-1\n", 2, "Invalid value"),
+        ("[tank]\nid = T-1\n", 2, "a text needs quotation marks"),
         ("[tank]\nid = 1\nid = 2\n", 3, "given twice"),
         ("id = 1\n", 1, "is in no [section]"),
         ("x = " + "[" * 3000, None, "too deeply nested"),

@@ -202,7 +202,7 @@ class Texts:
 
     def example(self, field, given):
         """An example of a field in the words of the form."""
-        known = self.words["input"].get("examples", {})
+        known = self.words["input"]["examples"]
         return known.get(given, self.value(field, given)) if isinstance(given, str) else given
 
     def input_note(self, name, declarable):
