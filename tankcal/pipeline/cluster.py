@@ -18,6 +18,7 @@ from urllib.parse import urlsplit
 import tankcal
 from tankcal.errors import InputError, Problem, TankcalError, reason_of
 from tankcal.messages import message
+from tankcal.version import install_command
 
 OPTION = "--cluster"
 WORKER_BYTES = 1 << 30  # of memory that a worker of this machine may take
@@ -58,8 +59,8 @@ def open_client(workers, *, worker_bytes=WORKER_BYTES, settings=()):
         raise refusal(
             message(
                 "cluster_no_library",
-                "needs the library distributed, which is not installed; expected: "
-                "pip install 'tankcal[cluster]'",
+                "needs the library distributed, which is not installed; expected: {command}",
+                command=install_command("cluster"),
             )
         )
     with _quiet(), _client_of(workers, worker_bytes, dict(settings)) as client:
