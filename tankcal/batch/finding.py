@@ -16,8 +16,7 @@ from pathlib import Path
 
 from tankcal.batch.asked import OWN, Asked
 from tankcal.errors import InputError, Problem, reason_of
-from tankcal.job.folder import decode
-from tankcal.job.loading import results_given_as_job
+from tankcal.job.folder import decode, results_given_as_job
 from tankcal.job.tables import SETTINGS_FILE, SETTINGS_SHEET, Log, read_bytes
 from tankcal.messages import message
 from tankcal.text.naming import file_name

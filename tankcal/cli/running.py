@@ -21,7 +21,13 @@ from tankcal.cli.showing import (
 from tankcal.errors import Problem, SolutionError, problem_of
 from tankcal.messages import message
 from tankcal.tank.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
-from tankcal.text.digits import decimals_of_height, fixed, format_significant, format_with_u
+from tankcal.text.digits import (
+    decimals_of,
+    decimals_of_height,
+    fixed,
+    format_significant,
+    format_with_u,
+)
 
 
 def add(commands):
@@ -190,7 +196,8 @@ def _capacity(result):
     top_m = result.table.height_m[-1]
     top, stated = result.at(top_m), result.intervals
     unit, factor, decimals = _volume_unit(result.job.table.volume_unit)
-    volume = format_with_u(factor * top.value_m3, factor * stated.U_m3[-1], marks(), least=0)
+    U = factor * stated.U_m3[-1]
+    volume = format_with_u(factor * top.value_m3, U, marks(), least=0)
     how = message("by_monte_carlo", "by Monte Carlo")
     if stated.by_gum[-1]:
         how = message("with_k", "k = {factor:.2f}", factor=top.k)
@@ -221,7 +228,7 @@ def _capacity(result):
         tank=result.job.tank.id,
         volume=volume.value,
         height=fixed(top_m, decimals_of_height(top_m), marks()),
-        uncertainty=volume.uncertainty,
+        uncertainty=fixed(U, decimals_of(U, least=None), marks()),
         how=how,
         points=points,
     )

@@ -27,6 +27,10 @@ from tankcal.job.tables import (
 from tankcal.messages import message
 from tankcal.text.decoding import decode_text
 
+SAVED_FILES = (  # what commands save; a folder with such a file and no job.toml holds results
+    *("record.json", "comparison.json", "inspection.json", "history.json", "camera.json"),
+    *("plan.json", "scores.json"),
+)
 MAX_SETTINGS_BYTES = 1_000_000
 MAX_SETTINGS_LINE = 4000  # characters
 DECIMALS = (".", ",")
@@ -456,3 +460,30 @@ def _csv_rows(file, text, separator, log):
                 number,
             )
             yield number, None
+
+
+def results_given_as_job(path):
+    """Message about a path to results where a job is expected; None for any other path.
+
+    The message names the job whose results they are where it lies in its usual place.
+    """
+    saved = saved_file_in(path)
+    if saved is None or (path / SETTINGS_FILE).exists():
+        return None
+    whole = (path if path.is_dir() else path.parent).resolve()
+    book = whole.with_name(f"{whole.name.removesuffix('-results')}.xlsx")
+    job = next((one for one in (whole.parent / SETTINGS_FILE, book) if one.is_file()), None)
+    hint = "" if job is None else message("job_of_results", ": {job}", job=str(job))
+    return message(
+        "results_as_job",
+        "holds results ({saved}), not a job; expected a job folder, its job.toml or a workbook "
+        "(.xlsx){hint}",
+        saved=saved, hint=hint,
+    )  # fmt: skip
+
+
+def saved_file_in(path):
+    """Name of the file of results that a path is, or that its folder holds; None: of neither."""
+    if path.is_dir():
+        return next((name for name in SAVED_FILES if (path / name).is_file()), None)
+    return path.name if path.name in SAVED_FILES and path.is_file() else None

@@ -4,15 +4,11 @@ from os import PathLike
 from pathlib import Path
 
 from tankcal.job.building import job_of
-from tankcal.job.folder import read_folder
+from tankcal.job.folder import read_folder, results_given_as_job
 from tankcal.job.model import Job
 from tankcal.job.tables import SETTINGS_FILE, Log
 from tankcal.messages import message
 
-SAVED_FILES = (  # what commands save; a folder with such a file and no job.toml holds results
-    *("record.json", "comparison.json", "inspection.json", "history.json", "camera.json"),
-    *("plan.json", "scores.json"),
-)
 OTHER_WORKBOOKS = (".xls", ".xlsm", ".xlsb", ".xltx", ".ods", ".numbers")
 
 
@@ -121,30 +117,3 @@ def _read(path, log, edited):
         path.name or ".", message("no_job", "{found}; {expected}", found=found, expected=expected)
     )
     return None
-
-
-def results_given_as_job(path):
-    """Message about a path to results where a job is expected; None for any other path.
-
-    The message names the job whose results they are where it lies in its usual place.
-    """
-    saved = saved_file_in(path)
-    if saved is None or (path / SETTINGS_FILE).exists():
-        return None
-    whole = (path if path.is_dir() else path.parent).resolve()
-    book = whole.with_name(f"{whole.name.removesuffix('-results')}.xlsx")
-    job = next((one for one in (whole.parent / SETTINGS_FILE, book) if one.is_file()), None)
-    hint = "" if job is None else message("job_of_results", ": {job}", job=str(job))
-    return message(
-        "results_as_job",
-        "holds results ({saved}), not a job; expected a job folder, its job.toml or a workbook "
-        "(.xlsx){hint}",
-        saved=saved, hint=hint,
-    )  # fmt: skip
-
-
-def saved_file_in(path):
-    """Name of the file of results that a path is, or that its folder holds; None: of neither."""
-    if path.is_dir():
-        return next((name for name in SAVED_FILES if (path / name).is_file()), None)
-    return path.name if path.name in SAVED_FILES and path.is_file() else None

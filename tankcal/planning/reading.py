@@ -29,9 +29,9 @@ from tankcal.job.folder import (
     flattened,
     parsed_toml,
     read_csv,
+    saved_file_in,
 )
 from tankcal.job.folder import read_register as read_register_file
-from tankcal.job.loading import saved_file_in
 from tankcal.job.measuring import make_measurements
 from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import (

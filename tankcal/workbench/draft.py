@@ -14,8 +14,8 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.job.contract import COLUMNS, KINDS, columns_of
-from tankcal.job.folder import csv_marks, decode, parsed_toml, read_toml
-from tankcal.job.loading import load_edited, results_given_as_job
+from tankcal.job.folder import csv_marks, decode, parsed_toml, read_toml, results_given_as_job
+from tankcal.job.loading import load_edited
 from tankcal.job.tables import REGISTERS, SETTINGS_FILE, TABLES, Log, meant, read_bytes
 from tankcal.messages import message
 from tankcal.text.decoding import decode_text, find_encoding

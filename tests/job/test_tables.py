@@ -9,9 +9,11 @@ from job_builder import job_parts, write_book
 
 from tankcal.job.field_values import read_value
 from tankcal.job.fields import Field, Refused
-from tankcal.job.folder import read_csv, read_folder, read_toml
+from tankcal.job.folder import parsed_toml, read_csv, read_folder, read_toml
 from tankcal.job.sheets import read_workbook
 from tankcal.job.tables import MAX_PROBLEMS_PER_FILE, BadCell, Log, nearest, shown
+from tankcal.messages import Message
+from tankcal.text.words import MESSAGES, load_words
 
 
 def csv_table(text, separator=",", decimal="."):
@@ -80,6 +82,26 @@ def test_settings_know_their_rows():
     assert (settings["tank"]["id"].raw, settings["tank"]["id"].row) == ("T", 3)
     assert (settings["table"]["step_m"].raw, settings["table"]["step_m"].row) == (0.01, 6)
     assert sections == {"tank": 2, "table": 5, "a": None, "a.b": 7}
+
+
+BROKEN_TOML = (
+    "id = T-1", 'id = "T', "id = 'T", "id 1", "= 1", "[tank\nid = 1", "[[tank]\n", "id = [1, 2",
+    "id = {a = 1", "id = 1 2", 'id = "C:\\dir"', 'id = "\\uZZZZ"', 'id = "\\ud800"',
+    "id = 2026-02-30",
+    "id = 1\nid = 2", "a = {b = 1}\na.c = 2", "a = {b = 1, b = 2}", "id = \"a\x01b\"", "id", "id =",
+    "[]", "[a.]", "[a]\n[a]\n", "a = 1\n[a]\n", 'id = """a', "x = [[" + "[" * 3000, "\x01",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("language", ["pt-BR", "es"])
+@pytest.mark.parametrize("text", BROKEN_TOML, ids=range(len(BROKEN_TOML)))
+def test_every_error_of_toml_is_told_in_the_language(text, language):
+    log = Log()
+    assert parsed_toml("job.toml", text.encode(), log) is None
+    reason = log.problems[0].expected.values.get("reason")
+    assert isinstance(reason, Message), text
+    words = load_words(language)
+    assert any(reason.code in words[group] for group in MESSAGES)
 
 
 @pytest.mark.parametrize(
