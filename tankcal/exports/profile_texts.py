@@ -61,6 +61,7 @@ _TEXTS = (
     message("profile_siemens_linear", "Siemens LUT400, HydroRanger (linear)"),
     message("profile_tls", "Veeder-Root TLS (20 points)"),
     message("profile_arts", "ARTS retail data model"),
+    message("profile_own_choice", "own choice of tankcal"),
     message("profile_from_memory", "from memory: 1, 4 or 20 points"),
 )
 _KNOWN = {str(one): one for one in _TEXTS}

@@ -31,8 +31,7 @@ def test_a_volume_is_shown_in_the_unit_of_the_job(example_record, unit, factor):
 def test_no_table_of_a_report_in_litres_has_cubic_metres(example_record):
     paper = paper_in(example_record, "L")
     found = [paper.show(CORRECTIONS), *budget.top(paper), *budget.others(paper)]
-    columns = [one for block in found for one in block.data.get("columns", [])]
-    units = [one[1] for one in columns if isinstance(one, list)]
+    units = [one["unit"] for block in found for one in block.data.get("columns", [])]
     assert "L" in units
     assert not [one for one in units if one in ("m³", "m³/unit")]
 
