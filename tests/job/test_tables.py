@@ -419,3 +419,22 @@ def test_rows_below_a_heading_of_commas_are_not_guessed_at():
 def test_a_heading_of_semicolons_alone_stays_one_where_commas_are_declared():
     log = Log()
     assert read_csv("t.csv", b"a;b\n", ",", ".", log) is None
+
+
+STANDARDS = Field("standard", "choice", "", choices=("asme", "din_28011", "din_28013"))
+
+
+@pytest.mark.parametrize("text", ["DIN 28011", "din-28011", "DIN_28011", " Din28011 "])
+def test_a_choice_is_meant_by_its_letters_and_digits(text):
+    assert read_value(STANDARDS, text) == "din_28011"
+
+
+@pytest.mark.parametrize("text", ["DIN 2801", "28011", "DIN"])
+def test_a_part_of_a_choice_is_refused_with_the_choices(text):
+    with pytest.raises(Refused, match="'asme' or 'din_28011' or"):
+        read_value(STANDARDS, text)
+
+
+def test_codes_of_one_letter_are_not_guessed():
+    with pytest.raises(Refused):
+        read_value(Field("unit", "choice", "", choices=("m3", "L", "mm")), "l")
