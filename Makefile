@@ -13,7 +13,7 @@ export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
-demo: $(VENV)/base ## run the example, or any job: make demo JOB=path/to/job
+demo: $(VENV)/beginner ## run the example, or any job: make demo JOB=path/to/job
 ifdef JOB
 	$(BIN)/tankcal run "$(JOB)"
 else
@@ -83,13 +83,18 @@ wheel: $(VENV)/release ## wheel and source archive in dist/, built twice and com
 	.ci/wheel $(TAG)
 
 $(VENV)/base: pyproject.toml constraints.txt
+	@echo "setting up $(VENV): Python packages are fetched once, which takes some minutes"
 	test -x $(BIN)/python || python3 -m venv $(VENV)
-	$(BIN)/pip install --quiet --editable .
-	$(BIN)/python -m tankcal.cli.kernels
+	$(BIN)/pip install --editable .
 	touch $@
 
-$(VENV)/full: $(VENV)/base
+$(VENV)/beginner: $(VENV)/base # tankcal notebook and tankcal app, which the first pages name
+	$(BIN)/pip install --editable '.[lab,app]'
+	touch $@
+
+$(VENV)/full: $(VENV)/beginner
 	$(BIN)/pip install --quiet --editable '.[test,check,images,clouds,cluster,lab,app]'
+	$(BIN)/python -m tankcal.cli.kernels
 	touch $@
 
 $(PEERS)/errors.json: $(VENV)/full benchmarks/peers.py

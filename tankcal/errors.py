@@ -3,6 +3,8 @@
 `InputError` is the user's to mend (exit status 2), `SolutionError` is the survey's (exit status 3).
 """
 
+import errno
+import json
 from dataclasses import dataclass
 from math import isfinite
 
@@ -14,6 +16,53 @@ SHEET = "sheet "  # how the file of a problem in a workbook begins
 def sheet_named(name):
     """The place of a sheet, as a text that each language says in its words."""
     return message("in_sheet", "sheet {sheet}", sheet=name)
+
+
+_OF_SYSTEM = {
+    errno.ENOENT: message("no_such_file", "No such file or directory"),
+    errno.EACCES: message("permission_denied", "Permission denied"),
+    errno.EPERM: message("not_permitted", "Operation not permitted"),
+    errno.EISDIR: message("is_a_folder", "Is a directory"),
+    errno.ENOTDIR: message("is_no_folder", "Not a directory"),
+    errno.EEXIST: message("already_exists", "File exists"),
+    errno.ENOTEMPTY: message("folder_not_empty", "Directory not empty"),
+    errno.ENOSPC: message("no_space_left", "No space left on device"),
+    errno.EROFS: message("read_only_disk", "Read-only file system"),
+    errno.ENAMETOOLONG: message("name_too_long", "File name too long"),
+    errno.ELOOP: message("links_in_a_circle", "Too many levels of symbolic links"),
+    errno.EIO: message("disk_error", "Input/output error"),
+    errno.EBUSY: message("resource_busy", "Device or resource busy"),
+    errno.EMFILE: message("too_many_files", "Too many open files"),
+    errno.EINVAL: message("invalid_argument", "Invalid argument"),
+    errno.EADDRINUSE: message("address_in_use", "Address already in use"),
+    errno.EADDRNOTAVAIL: message("address_unknown", "Cannot assign requested address"),
+    errno.ECONNREFUSED: message("connection_refused", "Connection refused"),
+}
+
+
+def reason_of(error):
+    """Why a file cannot be read or written, as a Message where the reason is a usual one.
+
+    Parameters
+    ----------
+    error : Exception
+        An OSError, an error of the JSON or UTF-8 reader, or any other.
+
+    Examples
+    --------
+    >>> reason_of(FileNotFoundError(errno.ENOENT, "nao existe"))
+    'No such file or directory'
+    """
+    if isinstance(error, json.JSONDecodeError):
+        return message("not_json", "not JSON: row {row}, column {column}",
+                       row=str(error.lineno), column=str(error.colno))  # fmt: skip
+    if isinstance(error, UnicodeDecodeError):
+        return message("not_utf8", "not UTF-8 text: byte {at}", at=error.start + 1)
+    if isinstance(error, RecursionError):
+        return message("nested_too_deeply", "nested too deeply")
+    if isinstance(error, OSError):
+        return _OF_SYSTEM.get(error.errno) or error.strerror or str(error) or type(error).__name__
+    return str(error) or type(error).__name__
 
 
 class TankcalError(Exception):

@@ -10,6 +10,7 @@ the number is that of the release that CHANGELOG.md is about. The build reads it
 import os
 import re
 import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 
@@ -136,3 +137,30 @@ def _ask_git(root, *words):
     except (OSError, subprocess.SubprocessError):
         return ""
     return done.stdout.decode("utf-8", errors="replace").strip()
+
+
+def install_command(extra):
+    """Command that installs the libraries of an extra beside this tankcal.
+
+    It names the libraries, which the package index holds, and not tankcal, which it does not: so
+    the command works in a clone, from a wheel and in a container.
+
+    Parameters
+    ----------
+    extra : str
+        Such as "app", of pyproject.toml.
+
+    Returns
+    -------
+    str
+        For the shell of any system.
+    """
+    from importlib.metadata import PackageNotFoundError, requires
+
+    mark = re.compile(rf"""extra\s*==\s*['"]{extra}['"]""")
+    try:
+        needed = [one.partition(";")[0].strip() for one in requires("tankcal") if mark.search(one)]
+    except PackageNotFoundError:  # run from its sources, which no pip has installed
+        needed = [f"{_ROOT}[{extra}]"]
+    names = " ".join(f'"{one}"' for one in needed)
+    return f"{sys.executable} -m pip install {names}"

@@ -4,8 +4,8 @@
 
 A line that ends in **`path`**: names the file that the next block is; where it begins with words
 of APPEND the block goes to the end of that file. A block `console` has commands behind `$ ` and
-what they print; `...` in it stands for anything. A block `pycon` is a session of Python. The
-language of the terminal is that of the file's name.
+what they print; `...` in it stands for anything. `examples` are those of the project. A block
+`pycon` is a session of Python. The language of the terminal is that of the file's name.
 """
 
 import os
@@ -17,6 +17,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+ROOT = Path(__file__).parents[1]
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"^(?P<words>.*)\*\*`(?P<path>[^`]+)`\*\*:\n\n$", re.MULTILINE)
 APPEND = ("No fim de", "Al final de", "At the end of")
@@ -60,6 +61,7 @@ def agrees(expected, printed):
 def run_page(path, folder):
     """[(block, [(command, expected, printed)])]: the session of a page, run in `folder`."""
     done = []
+    (folder / "examples").symlink_to(ROOT / "examples")
     for block in blocks_of(path.read_text(encoding="utf-8")):
         if block.path is not None:
             target = folder / block.path
@@ -92,7 +94,7 @@ def environment(page):
     """Of the reader of a page."""
     language = re.search(r"-(pt-BR|es)$", page.stem)
     kept = {k: v for k, v in os.environ.items() if not k.startswith("LC_")}
-    root = str(Path(__file__).parents[1])
+    root = str(ROOT)
     return kept | {
         "LANG": LOCALES[language[1]] if language else "C.UTF-8",
         "PYTHONPATH": os.pathsep.join([root, kept.get("PYTHONPATH", "")]).rstrip(os.pathsep),

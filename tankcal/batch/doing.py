@@ -20,7 +20,7 @@ from tankcal.batch.outcomes import (
     load_outcome,
     save_outcome,
 )
-from tankcal.errors import InputError, Problem, TankcalError, problem_of
+from tankcal.errors import InputError, Problem, TankcalError, problem_of, reason_of
 from tankcal.messages import message
 
 IN_THE_WAY = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR)  # of one job, not of the batch
@@ -76,7 +76,7 @@ def do_job(task):
             "batch_no_room",
             "nothing more can be written there ({reason}); expected room for the results: then the "
             "same command goes on",
-            reason=error.strerror or str(error),
+            reason=reason_of(error),
         )
         raise InputError(Problem(task.out, text)) from error
 
@@ -85,7 +85,7 @@ def _in_the_way(task, error):
     """What `do_job` gives where something else lies in the place of a job's folder or outcome."""
     path = error.filename2 or error.filename or folder_of(task.out, task.job.name)
     text = message("batch_in_the_way", "is no file or folder of a batch ({reason}); expected it "
-                   "taken away", reason=error.strerror or str(error))  # fmt: skip
+                   "taken away", reason=reason_of(error))  # fmt: skip
     return "failed", [problem_of(Problem(os.path.relpath(path, task.out), text))], 1
 
 
@@ -151,7 +151,7 @@ def _outcome_of(step, task, clock):
         if error.errno in NO_ROOM:
             raise
         place = os.path.basename(str(error.filename or "")) or name
-        return _unfinished(key, "failed", [Problem(place, error.strerror or str(error))])
+        return _unfinished(key, "failed", [Problem(place, reason_of(error))])
     except Exception as error:  # a mistake of tankcal: it must not stop the other jobs
         text = message("batch_mistake", "a mistake of tankcal, please report it with the job "
                        "({name}: {error})", name=type(error).__name__,

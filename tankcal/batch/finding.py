@@ -15,8 +15,8 @@ from hashlib import sha256
 from pathlib import Path
 
 from tankcal.batch.asked import OWN, Asked
-from tankcal.errors import InputError, Problem
-from tankcal.job.folder import decode
+from tankcal.errors import InputError, Problem, reason_of
+from tankcal.job.folder import decode, results_given_as_job
 from tankcal.job.tables import (
     SETTINGS_FILE,
     SETTINGS_SHEET,
@@ -150,11 +150,12 @@ def _in_path(path, wants, log, strict=True):
         inside = _in_folder(path, wants)
     except OSError as error:
         text = message("batch_folder_unreadable", "the folder cannot be read ({reason})",
-                       reason=error.strerror or type(error).__name__)  # fmt: skip
+                       reason=reason_of(error))  # fmt: skip
         log.problem(error.filename or str(path), text)
         return []
     if not inside and strict:
-        log.problem(str(path), _nothing_inside(wants.kind))
+        results = None if wants.kind == "records" else results_given_as_job(path)
+        log.problem(str(path), results or _nothing_inside(wants.kind))
     return [Found(one, {}) for one in inside]
 
 

@@ -25,7 +25,7 @@ from tankcal.batch.outcomes import (
     save_outcome,
 )
 from tankcal.batch.summary import write_summary
-from tankcal.errors import Problem, problem_of
+from tankcal.errors import Problem, problem_of, reason_of
 from tankcal.messages import message
 from tankcal.pipeline.cluster import Watch, count_cores, failures_told, is_installed, open_client
 
@@ -143,7 +143,7 @@ def _unsettled(jobs, journal, batch, telling):
             task = replace(task, keys=keys_of(job, former_or_none(job)))
         except OSError as error:
             text = message("batch_input_unreadable", "cannot be read ({reason})",
-                           reason=error.strerror or str(error))  # fmt: skip
+                           reason=reason_of(error))  # fmt: skip
             found = fail_job(task, Problem(str(error.filename or job.source), text))
             batch.counts[found[0]] += 1
             telling.ended(job.name, *found)

@@ -10,7 +10,7 @@ import numpy as np
 from tankcal.calibration.edges import Frame
 from tankcal.camera.formats.frame import make_film_camera, make_framed_camera
 from tankcal.camera.model import AFFINITIES, CONVENTIONS, PARAMETERS, Form
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, reason_of
 from tankcal.messages import Message, list_some, message
 
 MOST_NAMES = 20  # in a message
@@ -387,7 +387,7 @@ def _why(error):
         return message("camera_key_missing", "missing key {key!r}", key=str(error.args[0]))
     if error.args and isinstance(error.args[0], Message):
         return error.args[0]
-    return message("camera_unreadable", "cannot be read: {error}", error=str(error))
+    return message("camera_unreadable", "cannot be read: {error}", error=reason_of(error))
 
 
 def _problem(expected, column=None):

@@ -27,10 +27,10 @@ from tankcal.cli import (
 )
 from tankcal.cli.help_words import argparse_in, put_in_words
 from tankcal.cli.machine import failure, print_json
-from tankcal.cli.showing import complain, speak, words_of_run
+from tankcal.cli.showing import complain, say_in_language, speak, words_of_run
 from tankcal.cli.stopping import ended_by_signals, is_of_memory, stopped_status
-from tankcal.errors import TankcalError
-from tankcal.messages import message, printable, printable_lines
+from tankcal.errors import Problem, TankcalError, reason_of
+from tankcal.messages import message, printable_lines
 
 DESCRIPTION = """\
 tankcal calibrates storage tanks: from surveyed points of the wall to the capacity
@@ -113,8 +113,7 @@ def _status_of(error):
         )
         return 2
     if isinstance(error, OSError):
-        name = printable(error.filename or "system")
-        print(f"tankcal: {name}: {printable(error.strerror or error)}", file=sys.stderr)
+        complain(Problem(str(error.filename or "system"), reason_of(error)).text)
         return 2
     raise error
 
@@ -142,6 +141,19 @@ class _Parser(argparse.ArgumentParser):
 
     def _print_message(self, message, file=None):
         super()._print_message(printable_lines(message), file)
+
+    def _check_value(self, action, value):
+        """Refuse a word that is no choice; a misspelt choice is named in place of the list."""
+        spelt = None
+        if action.choices and value not in action.choices:
+            from tankcal.job.tables import meant, shown  # half a second
+
+            spelt = meant(value, action.choices)
+        if spelt is None:
+            return super()._check_value(action, value)
+        text = message("choice_meant", "found {found}; did you mean '{spelt}'?",
+                       found=shown(value), spelt=spelt)  # fmt: skip
+        raise argparse.ArgumentError(action, say_in_language(text))
 
 
 class _Version(argparse.Action):

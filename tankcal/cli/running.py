@@ -20,9 +20,14 @@ from tankcal.cli.showing import (
 )
 from tankcal.errors import Problem, SolutionError, problem_of
 from tankcal.messages import message
-from tankcal.text.digits import decimals_of_height, fixed, format_significant, format_with_u
-
-DECIMALS_WITHOUT_U = 3  # of a volume in m3: litres
+from tankcal.tank.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
+from tankcal.text.digits import (
+    decimals_of,
+    decimals_of_height,
+    fixed,
+    format_significant,
+    format_with_u,
+)
 
 
 def add(commands):
@@ -203,7 +208,9 @@ def _capacity(result):
     """One line: what the tank holds to the digits of U, and how many points say so."""
     top_m = result.table.height_m[-1]
     top, stated = result.at(top_m), result.intervals
-    volume = format_with_u(top.value_m3, stated.U_m3[-1], marks(), least=0)
+    unit, factor, decimals = _volume_unit(result.job.table.volume_unit)
+    U = factor * stated.U_m3[-1]
+    volume = format_with_u(factor * top.value_m3, U, marks(), least=0)
     how = message("by_monte_carlo", "by Monte Carlo")
     if stated.by_gum[-1]:
         how = message("with_k", "k = {factor:.2f}", factor=top.k)
@@ -219,23 +226,31 @@ def _capacity(result):
     if not stated.U_m3[-1] > 0:
         return message(
             "holds_without_u",
-            "{tank}: {volume} m3 at {height} m, no uncertainty stated, because none was "
+            "{tank}: {volume} {unit} at {height} m, no uncertainty stated, because none was "
             "declared{points}",
             tank=result.job.tank.id,
-            volume=fixed(top.value_m3, DECIMALS_WITHOUT_U, marks()),
+            volume=fixed(factor * top.value_m3, decimals, marks()),
+            unit=unit,
             height=fixed(top_m, decimals_of_height(top_m), marks()),
             points=points,
         )
     return message(
         "holds",
-        "{tank}: {volume} m3 at {height} m, U = {uncertainty} m3 ({how}){points}",
+        "{tank}: {volume} {unit} at {height} m, U = {uncertainty} {unit} ({how}){points}",
+        unit=unit,
         tank=result.job.tank.id,
         volume=volume.value,
         height=fixed(top_m, decimals_of_height(top_m), marks()),
-        uncertainty=volume.uncertainty,
+        uncertainty=fixed(U, decimals_of(U, least=None), marks()),
         how=how,
         points=points,
     )
+
+
+def _volume_unit(name):
+    """(a unit of volumes as the terminal shows it, its factor from m3, decimals of a row)."""
+    shown = message("cubic_metres", "m3") if name == "m3" else name
+    return shown, float(1 / VOLUME_UNITS_M3[name]), TABLE_DECIMALS[name]
 
 
 def _adjust(cluster, source, out, quiet, strict, papers, tell=_tell):

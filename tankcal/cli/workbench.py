@@ -7,6 +7,7 @@ from tankcal.cli.showing import complain, prepare_for_small_work, say, speak
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.text.languages import LANGUAGES
+from tankcal.version import install_command
 
 MOST_PORT = 65535
 
@@ -101,8 +102,9 @@ def _notebook(options):
         complain(
             message(
                 "no_lab",
-                "JupyterLab is not installed here: pip install 'tankcal[lab]' installs it with the "
-                "grids; the notebook also opens in any other Jupyter",
+                "JupyterLab is not installed here; the notebook also opens in any other Jupyter. "
+                "This command installs JupyterLab with the grids: {command}",
+                command=install_command("lab"),
             )
         )
         return
@@ -115,7 +117,9 @@ def _app(options):
 
     if not serving.has_app():
         expected = message(
-            "no_app", "Voilà is not installed here: pip install 'tankcal[app]' installs it"
+            "no_app",
+            "Voilà is not installed here; this command installs it: {command}",
+            command=install_command("app"),
         )
         raise InputError(Problem("tankcal app", expected))
     path = _written(options, None)

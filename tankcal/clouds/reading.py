@@ -8,6 +8,7 @@ from tankcal.clouds.contents import WHOLE, CloudChunk, CloudHeader
 from tankcal.clouds.formats import describe_file, read_pieces, share_out
 from tankcal.clouds.formats.columns import rows_about
 from tankcal.clouds.formats.files import EXTENT_LIMIT, count_mismatch, open_cloud
+from tankcal.errors import reason_of
 from tankcal.messages import message
 
 COARSEST_M = 1e-4  # the next float32 after a coordinate may lie this far off
@@ -154,7 +155,7 @@ def _guarded(file, task):
     try:
         return task()
     except OSError as error:
-        reason = error.strerror or type(error).__name__
+        reason = reason_of(error)
         failed = message("cloud_file_failed", "reading it failed: {reason}", reason=reason)
         raise file.refusal(failed) from error
 

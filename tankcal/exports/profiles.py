@@ -11,6 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
+from tankcal.exports.profile_texts import as_message
 from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.entries import read_section
 from tankcal.job.fields import Field
@@ -357,4 +358,6 @@ def _profile(file, values):
         name = renamed.get(place, place[1])
         if value is not None:
             given[name] = int(value) if name in whole else value
+    for name in given.keys() & {"name", "source", "remark"}:
+        given[name] = as_message(given[name])
     return Profile(code=file.removesuffix(_ENDING), **given)

@@ -4,6 +4,7 @@ import csv
 import re
 import tomllib
 
+from tankcal.errors import reason_of
 from tankcal.job.tables import (
     COVARIANCE_FILE,
     MAX_FILE_BYTES,
@@ -29,12 +30,50 @@ from tankcal.text.decoding import WESTERN, decode_text, is_western
 from tankcal.text.delimited import separator_of_table
 from tankcal.text.spreadsheets import unguard_formula
 
+SAVED_FILES = (  # what commands save; a folder with such a file and no job.toml holds results
+    *("record.json", "comparison.json", "inspection.json", "history.json", "camera.json"),
+    *("plan.json", "scores.json"),
+)
 MAX_SETTINGS_BYTES = 1_000_000
 MAX_SETTINGS_LINE = 4000  # characters
 DECIMALS = (".", ",")
 OF_INSPECTIONS = ("settlement.csv", "edge_profiles.csv")  # beside a job, no part of it
 _LONGEST_START = 100_000  # bytes, of comments before a heading
-_TWICE = ("Cannot overwrite", "Cannot declare", "Cannot redefine")  # as tomllib begins these
+_TWICE = message("toml_given_twice", "a key or a section is given twice")
+_BROKEN_TEXT = message(
+    "toml_text_broken", "a text without its closing quotation mark, or with a control character"
+)
+_ESCAPE = message(
+    "toml_escape",
+    "a backslash in a text between double quotation marks; write two of them, or put the text "
+    "between single ones",
+)
+_TOML_REASONS = {  # {how tomllib begins a reason: the reason in our words}
+    "Cannot overwrite": _TWICE,
+    "Cannot declare": _TWICE,
+    "Cannot redefine": _TWICE,
+    "Cannot mutate": _TWICE,
+    "Duplicate inline": _TWICE,
+    "Invalid statement": message("toml_statement", "a line without a key"),
+    "Expected newline": message("toml_two_values", "text behind the value that is no # comment"),
+    "Expected '=' after": message("toml_no_equals", "a key without = behind it"),
+    "Expected ']": message("toml_no_bracket", "a section whose name has no closing ]"),
+    "Invalid initial": message("toml_no_key", "a key or a name without letters, digits, _ or -"),
+    "Unclosed array": message("toml_list_open", "a list without its closing ], or without a comma"),
+    "Unclosed inline": message("toml_table_open", "an inline table without its end or a comma"),
+    "Unterminated string": _BROKEN_TEXT,
+    "Illegal character": _BROKEN_TEXT,
+    "Found invalid": _BROKEN_TEXT,
+    "Expected ": _BROKEN_TEXT,  # its quotation mark
+    "Unescaped": _ESCAPE,
+    "Invalid hex": _ESCAPE,
+    "Escaped character": _ESCAPE,
+    "Invalid date": message("toml_no_date", "a date or a time that does not exist"),
+    "Invalid value": message(
+        "toml_value", "a value that is no number, date, list, true or false; a text needs "
+        "quotation marks",
+    ),
+}  # fmt: skip
 _DECIMAL_COMMA = re.compile(
     r"(\s*[\w.\"'-]+\s*=\s*[+-]?\d+),(\d+(?:[eE][+-]?\d+)?)\s*(?:#.*)?", re.DOTALL
 )
@@ -110,7 +149,7 @@ def _names_in(folder, log):
             message(
                 "folder_cannot_be_read",
                 "the folder cannot be read ({strerror})",
-                strerror=error.strerror,
+                strerror=reason_of(error),
             ),
         )
         return []
@@ -312,9 +351,8 @@ def _reason(error):
     if isinstance(error, RecursionError):
         return message("too_deep", "too deeply nested")
     reason = re.sub(r"\s*\(at .*\)$", "", str(error))
-    if reason.startswith(_TWICE):
-        return message("toml_given_twice", "a key or a section is given twice")
-    return reason
+    known = (said for start, said in _TOML_REASONS.items() if reason.startswith(start))
+    return next(known, reason)
 
 
 def _toml_rows(text):
@@ -440,3 +478,30 @@ def _csv_rows(file, text, separator, log):
                 number,
             )
             yield number, None
+
+
+def results_given_as_job(path):
+    """Message about a path to results where a job is expected; None for any other path.
+
+    The message names the job whose results they are where it lies in its usual place.
+    """
+    saved = saved_file_in(path)
+    if saved is None or (path / SETTINGS_FILE).exists():
+        return None
+    whole = (path if path.is_dir() else path.parent).resolve()
+    book = whole.with_name(f"{whole.name.removesuffix('-results')}.xlsx")
+    job = next((one for one in (whole.parent / SETTINGS_FILE, book) if one.is_file()), None)
+    hint = "" if job is None else message("job_of_results", ": {job}", job=str(job))
+    return message(
+        "results_as_job",
+        "holds results ({saved}), not a job; expected a job folder, its job.toml or a workbook "
+        "(.xlsx){hint}",
+        saved=saved, hint=hint,
+    )  # fmt: skip
+
+
+def saved_file_in(path):
+    """Name of the file of results that a path is, or that its folder holds; None: of neither."""
+    if path.is_dir():
+        return next((name for name in SAVED_FILES if (path / name).is_file()), None)
+    return path.name if path.name in SAVED_FILES and path.is_file() else None

@@ -4,7 +4,7 @@ from os import PathLike
 from pathlib import Path
 
 from tankcal.job.building import job_of
-from tankcal.job.folder import read_folder
+from tankcal.job.folder import read_folder, results_given_as_job
 from tankcal.job.model import Job
 from tankcal.job.tables import SETTINGS_FILE, TABLES, WORKBOOK_FILE, Log
 from tankcal.messages import message
@@ -111,6 +111,10 @@ def _read(path, log, edited):
     """RawJob, or None after telling `log` what `path` is instead of a job."""
     expected = message("expected_job", "expected a job folder, its job.toml or a workbook (.xlsx)")
     try:
+        results = results_given_as_job(path)
+        if results is not None:
+            log.problem(path.name or ".", results)
+            return None
         if path.is_dir():
             path = _form_in(path, log, edited)
             if path is None:

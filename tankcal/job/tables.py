@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from tankcal.errors import SHEET, InputError, Problem, sheet_named
+from tankcal.errors import SHEET, InputError, Problem, reason_of, sheet_named
 from tankcal.messages import message
 
 TANK_TABLES = (
@@ -295,7 +295,9 @@ def read_beside(folder, name, log, limit=MAX_FILE_BYTES):
 
 def unreadable_file(error):
     """What is said of a file that an OSError or a ValueError keeps from being read."""
-    reason = getattr(error, "strerror", None) or message("impossible_name", "impossible name")
+    reason = message("impossible_name", "impossible name")
+    if isinstance(error, OSError):
+        reason = reason_of(error)
     return message("file_cannot_be_read", "the file cannot be read ({reason})", reason=reason)
 
 

@@ -16,8 +16,9 @@ import warnings
 from urllib.parse import urlsplit
 
 import tankcal
-from tankcal.errors import InputError, Problem, TankcalError
+from tankcal.errors import InputError, Problem, TankcalError, reason_of
 from tankcal.messages import message
+from tankcal.version import install_command
 
 OPTION = "--cluster"
 WORKER_BYTES = 1 << 30  # of memory that a worker of this machine may take
@@ -58,8 +59,8 @@ def open_client(workers, *, worker_bytes=WORKER_BYTES, settings=()):
         raise refusal(
             message(
                 "cluster_no_library",
-                "needs the library distributed, which is not installed; expected: "
-                "pip install 'tankcal[cluster]'",
+                "needs the library distributed, which is not installed; expected: {command}",
+                command=install_command("cluster"),
             )
         )
     with _quiet(), _client_of(workers, worker_bytes, dict(settings)) as client:
@@ -209,7 +210,7 @@ def _no_answer(address, error):
             "no scheduler of dask answers at {address} ({reason}); expected such as "
             "tcp://192.168.1.20:8786, where `dask scheduler` runs",
             address=str(address),
-            reason=getattr(error, "strerror", None) or type(error).__name__,
+            reason=reason_of(error),
         )
     )
 

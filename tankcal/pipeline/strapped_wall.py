@@ -40,6 +40,7 @@ from tankcal.pipeline.wall_straps import (
     gauged_plates,
     mean_radii,
     told_courses,
+    typical_shape_m,
 )
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
 
@@ -148,7 +149,8 @@ def find_strapped_wall(job, progress, amplitudes=None):
     nominal, courses = job.tank.nominal_diameter_m / 2, [one.name for one in job.courses]
     reduced = reduce_straps(straps, job.survey.shell_temperature_c, 2 * nominal)
     places = [i for i, one in enumerate(reduced) if not one.strap.check]
-    term = AreaTerm(*perimeter_excess(straps.shape_sd_m, nominal))
+    shape_m = typical_shape_m() if straps.shape_sd_m is None else straps.shape_sd_m
+    term = AreaTerm(*perimeter_excess(shape_m, nominal))
     joints, zero = joints_of(job), shell_zero(job, None)
     readings = readings_of_straps([reduced[i] for i in places], courses, term)
     if lines is not None:
@@ -181,7 +183,7 @@ def find_strapped_wall(job, progress, amplitudes=None):
         area_term=term,
         plate_sd_m=gauged_plates(job),
         tapes=tapes_used(straps),
-        shape_sd_m=straps.shape_sd_m,
+        shape_sd_m=shape_m,
     )
 
 

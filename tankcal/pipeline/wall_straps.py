@@ -50,6 +50,14 @@ class AreaTerm:
     sd: float
 
 
+def typical_shape_m():
+    """Standard deviation of the radius round a typical shell, m: what `COMPONENTS` assume.
+
+    It is the root of the summed median variances of ovality, settlement and seams, 6.1 mm.
+    """
+    return float(np.sqrt(sum(one.median_m**2 for one in COMPONENTS if one.shape in ROUND_SHAPES)))
+
+
 def area_term(shape_sd_m, amplitudes, nominal_m, points=None):
     """`AreaTerm` of a wall, and the standard deviation of its radius that it follows from.
 

@@ -29,6 +29,7 @@ from tankcal.job.folder import (
     flattened,
     parsed_toml,
     read_csv,
+    saved_file_in,
 )
 from tankcal.job.folder import read_register as read_register_file
 from tankcal.job.measuring import make_measurements
@@ -174,6 +175,12 @@ def _folder(path, log):
             file=PLAN_FILE,
             same=PLAN_FILE,
         )
+        if saved := saved_file_in(path):
+            expected = message(
+                "results_as_plan",
+                "holds results ({saved}), not a plan; expected a plan's folder, or its {file}",
+                saved=saved, file=PLAN_FILE,
+            )  # fmt: skip
         log.problem(path.name or ".", expected)
     return path
 

@@ -9,7 +9,7 @@ from datetime import date
 from pathlib import Path
 
 from tankcal import record as records
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, reason_of
 from tankcal.job.tables import Log
 from tankcal.messages import list_some, message
 from tankcal.recalibration.history import DatedTable, history_of
@@ -163,7 +163,7 @@ def _below(folder, problems):
         text = message(
             "history_folder_unreadable",
             "a folder that cannot be read ({why}); expected one that can, or it left out",
-            why=error.strerror,
+            why=reason_of(error),
         )
         problems.append(Problem(str(error.filename), text))
 
@@ -222,7 +222,7 @@ def _parsed(content, path):
 
 
 def _unreadable(error, path):
-    text = message("history_no_json", "cannot be read: {error}", error=str(error))
+    text = message("history_no_json", "cannot be read: {error}", error=reason_of(error))
     return InputError(Problem(path.name, text))
 
 

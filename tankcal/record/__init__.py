@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, reason_of
 from tankcal.memory import without_collection
 from tankcal.messages import message
 from tankcal.record import manifest
@@ -118,7 +118,7 @@ def load(path, *, is_checked=True):
             record = read_json(path)
     except (OSError, ValueError, RecursionError) as error:
         expected = message(
-            "record_unreadable", "cannot be read as a record: {error}", error=str(error)
+            "record_unreadable", "cannot be read as a record: {error}", error=reason_of(error)
         )
         raise InputError(Problem(name, expected)) from error
     record = attached(migrated(record, name), path)

@@ -121,7 +121,7 @@ def _strapped_choices(job):
     return {
         "bottom": _bottom_choice(job),
         "survey": "strapping" if job.lines is None else "reference_line",
-        "area_term": "none" if job.strapping.shape_sd_m == 0 else 1000 * job.strapping.shape_sd_m,
+        "area_term": _area_term_choice(job.strapping.shape_sd_m),
         **_top_choice(job),
         "between_sections": "cylinders" if job.lines is None else "revolution",
         "tilt": "not_measured" if job.lines is None else "not_applied",
@@ -129,6 +129,12 @@ def _strapped_choices(job):
         "roof": _fitting_choice(job.switches.roof, roof, roof),
         "form": "learned",
     }
+
+
+def _area_term_choice(shape_sd_m):
+    if shape_sd_m is None:
+        return "assumed"
+    return "none" if shape_sd_m == 0 else 1000 * shape_sd_m
 
 
 def _ring_choices(result):

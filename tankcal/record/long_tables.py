@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, reason_of
 from tankcal.messages import list_some, message
 from tankcal.record.columns import (
     NO_INTEGER,
@@ -263,7 +263,7 @@ class _Beside:
                 "record_tables_missing",
                 "cannot be read ({reason}); expected it beside {record}, whose readings and points "
                 "it holds",
-                reason=error.strerror or type(error).__name__, record=self._record,
+                reason=reason_of(error), record=self._record,
             )  # fmt: skip
             raise InputError(Problem(self.path.name, text)) from None
         digest = hashlib.sha256(content).hexdigest()

@@ -67,7 +67,7 @@ class StrappingRecord(Saved):
         "from the bottom up; beside former radii only those that were measured again"
     )
     shape_sd_m: float = key(
-        "standard deviation of the radius round the wall: declared, or by the points"
+        "standard deviation of the radius round the wall: declared, by the points, or typical"
     )
     area_term: Finite = key("by how much the circle of a perimeter is too large, relative")
     area_term_sd: Finite = key("its standard deviation")

@@ -41,9 +41,13 @@ def deviation_map(paper):
 
 def capacity_curves(paper):
     """Litres per centimetre, and U, against height."""
-    capacity = paper.record["capacity"]
+    capacity, words = paper.record["capacity"], _words(paper)
+    U = [paper.volume_factor * one for one in stated_U_m3(capacity)]
     return plots.capacity_curves(
-        capacity["height_m"], capacity["area_m2"], stated_U_m3(capacity), _words(paper)
+        capacity["height_m"],
+        capacity["area_m2"],
+        U,
+        lambda name: words(name).replace("m³", paper.volume_symbol),
     )
 
 

@@ -9,7 +9,7 @@ import re
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, reason_of
 from tankcal.job.entries import read_section
 from tankcal.job.fields import Field
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
@@ -192,7 +192,7 @@ def read_saved(path):
                 message(
                     "letterhead_unreadable",
                     "cannot be read as a letterhead: {error}",
-                    error=str(error),
+                    error=reason_of(error),
                 ),
             )
         ) from error

@@ -37,6 +37,8 @@ UNITS = {
     "m2": Unit("m²"),
     "m3": Unit("m³", least=TABLE_DECIMALS["m3"]),
     "m3/unit": Unit("m³/unit"),
+    "L/unit": Unit("L/unit", float(1 / VOLUME_UNITS_M3["L"])),
+    "bbl/unit": Unit("bbl/unit", float(1 / VOLUME_UNITS_M3["bbl"])),
     "L": Unit("L", float(1 / VOLUME_UNITS_M3["L"])),
     "m3/h": Unit("m³/h"),
     "L/h": Unit("L/h", 1e3),

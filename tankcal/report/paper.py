@@ -59,6 +59,11 @@ class Paper(PlainPaper):
         self._path = path
         self.letterhead = read_saved(letterhead) if letterhead else None
 
+    @property
+    def volume_unit(self):
+        """The unit that the job chose for volumes."""
+        return (self.record["job"]["table"] or {}).get("volume_unit") or "m3"
+
     def input_name(self, row):
         """The name of an input of the budget."""
         return input_name(self.words, row)

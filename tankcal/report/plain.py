@@ -3,6 +3,7 @@
 What every paper shares, whatever it is about; nothing here computes a number.
 """
 
+from dataclasses import replace
 from datetime import date
 
 from tankcal.errors import VocabularyError
@@ -21,6 +22,39 @@ class PlainPaper:
     def __init__(self, words):
         self.words = words
         self.marks = marks_of(words)
+
+    # ---- the unit of volumes
+
+    volume_unit = "m3"  # of all volumes on this paper: m3, L or bbl
+
+    @property
+    def volume_symbol(self):
+        """How the unit of volumes is printed: "m³"."""
+        return numbers.unit(self.volume_unit).symbol
+
+    @property
+    def volume_factor(self):
+        """What a volume in m3 is multiplied by."""
+        return numbers.unit(self.volume_unit).factor
+
+    def _shown_unit(self, unit):
+        """The unit that a value is shown in: one of volume becomes that of the paper."""
+        return unit.replace("m3", self.volume_unit, 1) if unit in ("m3", "m3/unit") else unit
+
+    def _fewer(self, decimals):
+        """Decimals in the paper's unit of volume of those chosen for m3; None stays None."""
+        if not isinstance(decimals, int):
+            return decimals
+        lost = numbers.unit("m3").least - numbers.unit(self.volume_unit).least
+        return max(decimals - lost, 0)
+
+    def _in_unit(self, column):
+        """A Column of volumes in m3 in the unit of the paper; any other as it is."""
+        unit = self._shown_unit(column.unit)
+        if unit == column.unit:
+            return column
+        decimals, least = self._fewer(column.decimals), self._fewer(column.least)
+        return replace(column, unit=unit, decimals=decimals, least=least)
 
     # ---- words and numbers
 
@@ -51,7 +85,9 @@ class PlainPaper:
         """
         if value is None:
             return None
-        shown = numbers.unit(unit)
+        shown = numbers.unit(self._shown_unit(unit))
+        if self._shown_unit(unit) != unit:
+            decimals = self._fewer(decimals)
         if u is not None:
             decimals = decimals_of(u * shown.factor, least=None if u == value else 0)
         if decimals is not None:
@@ -133,6 +169,7 @@ class PlainPaper:
 
     def table(self, name, rows, columns, /, across=None, **values):
         """A table with caption `captions.<name>`; `across` sets a long one in columns."""
+        columns = [self._in_unit(column) for column in columns]
         texts = [self.column_texts(rows, column) for column in columns]
         heads = [
             [self.word(f"table_headings.{c.heading or c.key}"), self._unit_in_words(c.unit)]

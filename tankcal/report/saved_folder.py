@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from tankcal.errors import InputError, Problem, TankcalError, VocabularyError
+from tankcal.errors import InputError, Problem, TankcalError, VocabularyError, reason_of
 from tankcal.messages import Message
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.report import folders
@@ -61,7 +61,7 @@ class SavedFolder:
         try:
             found = read_json(path)
         except (OSError, ValueError, RecursionError) as error:
-            raise InputError(Problem(name, self.unreadable(str(error)))) from error
+            raise InputError(Problem(name, self.unreadable(reason_of(error)))) from error
         return self.saved_format.migrated(found, name)
 
     def write(self, folder, fill, language=None, progress=None):

@@ -66,6 +66,10 @@ FORM_WORDS = {
         "level": ("nível",),
         "plummet": ("prumo",),
         "stadia": ("estádia",),
+        "before": ("antes",),
+        "after": ("depois",),
+        "rust": ("ferrugem",),
+        "paint": ("pintura",),
     },
     "es": {
         YES: ("sí", "verdadero"),
@@ -125,6 +129,10 @@ FORM_WORDS = {
         "level": ("nivel",),
         "plummet": ("plomada",),
         "stadia": ("estadia",),
+        "before": ("antes",),
+        "after": ("después",),
+        "rust": ("óxido",),
+        "paint": ("pintura",),
     },
 }
 
@@ -135,7 +143,11 @@ def word_of(language, choice):
 
 
 def meant(word, choices):
-    """The one of the choices that a word of any form means, or None: none of them, or several."""
+    """The one of the choices that a word of any form means, or None: none of them, or several.
+
+    A choice is also meant by its own letters and digits, however they are parted and in capitals
+    or not: "DIN 28011" for din_28011. Units and codes of one or two letters are taken as they are.
+    """
     plain = _plain(word)
     found = {
         choice
@@ -143,7 +155,14 @@ def meant(word, choices):
         for choice in choices
         if plain in map(_plain, words.get(choice, ()))
     }
+    if not found:
+        bare = _bare(word)
+        found = {one for one in choices if len(bare) > 2 and _bare(one) == bare}
     return found.pop() if len(found) == 1 else None
+
+
+def _bare(word):
+    return "".join(char for char in _plain(word) if char.isalnum())
 
 
 def _plain(word):

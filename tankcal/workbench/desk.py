@@ -12,7 +12,7 @@ import os
 from importlib.util import find_spec
 from pathlib import Path
 
-from tankcal.errors import InputError, TankcalError
+from tankcal.errors import InputError, TankcalError, reason_of
 from tankcal.job.contract import SURVEYS, TABLES_OF_KIND
 from tankcal.job.tables import REGISTERS, TABLES
 from tankcal.report.folders import default_folder
@@ -212,7 +212,7 @@ class Desk:
         except InputError as error:
             raise self.refusal(error) from None
         except OSError as error:
-            reason = error.strerror or str(error)
+            reason = self.reader.say(reason_of(error))
             raise Refusal(self.reader.word("not_saved", reason=reason)) from None
         self._checked = None
         self.tell()
@@ -249,7 +249,7 @@ class Desk:
         except TankcalError as error:
             raise self.refusal(error) from None
         except OSError as error:
-            reason = error.strerror or str(error)
+            reason = self.reader.say(reason_of(error))
             raise Refusal(self.reader.word("not_written", reason=reason)) from None
         self.keep_run(run)
         return run.result

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.job.contract import COLUMNS, KINDS, columns_of
-from tankcal.job.folder import csv_marks, decode, parsed_toml, read_toml
+from tankcal.job.folder import csv_marks, decode, parsed_toml, read_toml, results_given_as_job
 from tankcal.job.loading import load_edited
 from tankcal.job.tables import (
     REGISTERS,
@@ -59,16 +59,12 @@ def source_of(path):
             return folder / WORKBOOK_FILE
         if path.suffix.lower() == ".xlsx" and path.is_file():
             return path
-    raise InputError(
-        Problem(
-            path.name or str(path),
-            message(
-                "no_job_to_open",
-                "no job there; expected a folder with job.toml or a workbook (.xlsx), such as "
-                "tankcal new writes",
-            ),
-        )
+    no_job = message(
+        "no_job_to_open",
+        "no job there; expected a folder with job.toml or a workbook (.xlsx), such as tankcal new "
+        "writes",
     )
+    raise InputError(Problem(path.name or str(path), results_given_as_job(path) or no_job))
 
 
 class Draft:

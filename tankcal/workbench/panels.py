@@ -5,7 +5,7 @@ from html import escape
 
 import ipywidgets as widgets
 
-from tankcal.errors import InputError, TankcalError
+from tankcal.errors import InputError, TankcalError, reason_of
 from tankcal.workbench.desk import Refusal
 from tankcal.workbench.grid import Grid
 from tankcal.workbench.result_views import live_results, warnings_page
@@ -313,7 +313,7 @@ class ResultsPanel:
         elif isinstance(run.error, TankcalError):
             self._state("\n".join(self.desk.reader.say(one) for one in run.error.texts))
         elif isinstance(run.error, OSError):
-            reason = run.error.strerror or str(run.error)
+            reason = self.desk.reader.say(reason_of(run.error))
             self._state(word("not_written", reason=reason))
         else:
             self._state(f"{type(run.error).__name__}: {run.error}")

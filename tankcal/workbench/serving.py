@@ -7,7 +7,7 @@ import socket
 from contextlib import suppress
 from importlib.util import find_spec
 
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, reason_of
 from tankcal.messages import message
 
 HERE = "127.0.0.1"
@@ -96,7 +96,7 @@ def free_port(address, wanted=None):
             tried.bind((address, wanted or 0))
             return tried.getsockname()[1]
     except (OSError, OverflowError, UnicodeError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
+        reason = reason_of(error)
         expected = message(
             "address_not_free",
             "cannot listen on port {port} of {address} ({reason})",

@@ -287,7 +287,7 @@ def test_a_missing_library_is_told_in_one_line(tmp_path, monkeypatch):
     paths = [write_cloud(tmp_path / f"wall.{kind}", some_wall(5)) for kind in ("laz", "e57")]
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     for path in paths:
-        with pytest.raises(InputError, match=r"pip install 'tankcal\[clouds\]'"):
+        with pytest.raises(InputError, match=r'-m pip install "lazrs>='):
             describe_cloud(path)
 
 

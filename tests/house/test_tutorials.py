@@ -10,14 +10,15 @@ from pathlib import Path
 import openpyxl
 import pytest
 from filled_forms import fill_form, place_of
-from page_sessions import agrees, blocks_of, commands_of, run_page
+from page_sessions import FENCE, agrees, blocks_of, commands_of, run_page
 
 import tankcal
 from tankcal.cli import main
 
 DOCS = Path(__file__).parents[2] / "docs"
 TUTORIALS = {"tutorial-pt-BR.md": "tq-21", "tutorial-es.md": "tk-21"}
-PAGES = [*TUTORIALS, "coming-from.md"]
+SESSIONS = sorted(one.name for one in DOCS.glob("*.md") if "```console" in one.read_text("utf-8"))
+FEWEST = dict.fromkeys([*TUTORIALS, "coming-from.md"], 4)  # commands of a page; 1 of all others
 
 
 def files_of(page):
@@ -36,13 +37,28 @@ def rows(text):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", SESSIONS)
 def test_commands_print_what_the_page_shows(page, tmp_path):
     done = run_page(DOCS / page, tmp_path)
     told = [one for _, commands in done for one in commands]
-    assert len(told) >= 4
+    assert len(told) >= FEWEST.get(page, 1)
     for command, expected, printed in told:
         assert agrees(expected, printed), f"{command}\n{printed}"
+
+
+@pytest.mark.parametrize("page", SESSIONS)
+def test_each_file_of_a_session_has_a_name(page):
+    """Otherwise the file is not written, and the page shows how a command fails."""
+    blocks = blocks_of((DOCS / page).read_text(encoding="utf-8"))
+    assert [one.text for one in blocks if one.kind in ("csv", "toml") and not one.path] == []
+
+
+@pytest.mark.parametrize("page", TUTORIALS)
+def test_text_states_the_numbers_of_the_session(page):
+    text = (DOCS / page).read_text(encoding="utf-8")
+    stated = r"([\d,]+) m³ (?:a 7,200 m,|com|con) U = ([\d,]+) m³"
+    (in_text,) = re.findall(stated, FENCE.sub("", text))
+    assert {in_text} == set(re.findall(stated, text))
 
 
 def test_both_tutorials_have_the_same_numbers():
@@ -85,6 +101,18 @@ def test_volume_is_that_of_a_calculation_by_hand(page):
     printed, expanded = (float(one.replace(",", ".")) for one in told.groups())
     assert abs(printed - volume_m3) < 0.1  # the area that a wall out of round has less: 0.03
     assert abs(printed - volume_m3) < expanded
+
+
+@pytest.mark.parametrize("page", TUTORIALS)
+def test_numbers_of_the_check_by_hand_add_up(page):
+    text = FENCE.sub("", (DOCS / page).read_text(encoding="utf-8")).replace(",", ".")
+    radii = re.search(r"(5\.\d{4})[. ]+(5\.\d{4})[. ]+(5\.\d{4}) [ey] (5\.\d{4}) m\.", text)
+    cylinders, fittings, head, whole = (
+        float(re.search(rf"{words} (\d+\.\d+) m³", text)[1])
+        for words in (r"(?:suman|somam)", r"dren\w+\.", r"(?:total|todo)", r"S[oã][no]")
+    )
+    assert abs(sum(math.pi * float(one) ** 2 * 1.8 for one in radii.groups()) - cylinders) < 1e-3
+    assert abs(cylinders + fittings + head - whole) < 1e-3
 
 
 @pytest.mark.slow

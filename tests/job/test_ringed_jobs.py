@@ -159,6 +159,13 @@ SLIPS = {
         "shape_not_declared",
         ("job.toml", "shell.shape_sd_mm"),
     ),
+    "a torispherical end of no standard": (
+        lambda p: p.settings.update(
+            {"horizontal.end_a": "torispherical", "horizontal.thickness_mm": 8.0}
+        ),
+        "end_standard_missing",
+        ("job.toml", "horizontal.end_a_standard"),
+    ),
     "curved ends of no plate": (
         lambda p: p.settings.update(
             {"horizontal.end_a": "ellipsoidal", "horizontal.end_a_depth_m": 0.5}

@@ -9,9 +9,11 @@ from job_builder import job_parts, write_book
 
 from tankcal.job.field_values import read_value
 from tankcal.job.fields import Field, Refused
-from tankcal.job.folder import read_csv, read_folder, read_toml
+from tankcal.job.folder import parsed_toml, read_csv, read_folder, read_toml
 from tankcal.job.sheets import read_workbook
 from tankcal.job.tables import MAX_PROBLEMS_PER_FILE, BadCell, Log, nearest, shown
+from tankcal.messages import Message
+from tankcal.text.words import MESSAGES, load_words
 
 
 def csv_table(text, separator=",", decimal="."):
@@ -81,10 +83,30 @@ def test_settings_know_their_rows():
     assert sections == {"tank": 2, "table": 5, "a": None, "a.b": 7}
 
 
+BROKEN_TOML = (
+    "id = T-1", 'id = "T', "id = 'T", "id 1", "= 1", "[tank\nid = 1", "[[tank]\n", "id = [1, 2",
+    "id = {a = 1", "id = 1 2", 'id = "C:\\dir"', 'id = "\\uZZZZ"', 'id = "\\ud800"',
+    "id = 2026-02-30",
+    "id = 1\nid = 2", "a = {b = 1}\na.c = 2", "a = {b = 1, b = 2}", "id = \"a\x01b\"", "id", "id =",
+    "[]", "[a.]", "[a]\n[a]\n", "a = 1\n[a]\n", 'id = """a', "x = [[" + "[" * 3000, "\x01",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("language", ["pt-BR", "es"])
+@pytest.mark.parametrize("text", BROKEN_TOML, ids=range(len(BROKEN_TOML)))
+def test_every_error_of_toml_is_told_in_the_language(text, language):
+    log = Log()
+    assert parsed_toml("job.toml", text.encode(), log) is None
+    reason = log.problems[0].expected.values.get("reason")
+    assert isinstance(reason, Message), text
+    words = load_words(language)
+    assert any(reason.code in words[group] for group in MESSAGES)
+
+
 @pytest.mark.parametrize(
     ("text", "row", "words"),
     [
-        ("[tank]\nid = T-1\n", 2, "Invalid value"),
+        ("[tank]\nid = T-1\n", 2, "a text needs quotation marks"),
         ("[tank]\nid = 1\nid = 2\n", 3, "given twice"),
         ("id = 1\n", 1, "is in no [section]"),
         ("x = " + "[" * 3000, None, "too deeply nested"),
@@ -404,3 +426,22 @@ def test_the_heading_says_which_separator_there_is(data, declared):
 def test_a_list_in_a_cell_is_no_separator():
     table, problems = csv_table('a,b\n"1; 2; 3",4\n"5; 6; 7",8\n')
     assert (problems, table.rows) == ([], (("1; 2; 3", "4"), ("5; 6; 7", "8")))
+
+
+STANDARDS = Field("standard", "choice", "", choices=("asme", "din_28011", "din_28013"))
+
+
+@pytest.mark.parametrize("text", ["DIN 28011", "din-28011", "DIN_28011", " Din28011 "])
+def test_a_choice_is_meant_by_its_letters_and_digits(text):
+    assert read_value(STANDARDS, text) == "din_28011"
+
+
+@pytest.mark.parametrize("text", ["DIN 2801", "28011", "DIN"])
+def test_a_part_of_a_choice_is_refused_with_the_choices(text):
+    with pytest.raises(Refused, match="'asme' or 'din_28011' or"):
+        read_value(STANDARDS, text)
+
+
+def test_codes_of_one_letter_are_not_guessed():
+    with pytest.raises(Refused):
+        read_value(Field("unit", "choice", "", choices=("m3", "L", "mm")), "l")

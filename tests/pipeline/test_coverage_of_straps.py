@@ -9,13 +9,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from draws import draws
-from generated_strapping import shape_of, strapped_job
-from generated_walls import GeneratedWall, make_wall
+from generated_strapping import girth_of, shape_of, strapped_job
+from generated_walls import FAMILIES, GeneratedWall, make_wall
+from independent_shells import make_shell
 from test_coverage_of_walls import ROWS, judged, least_in_class, study
 
+from tankcal.geometry.girth import perimeter_excess
+from tankcal.geometry.outlines import FULL_TURN
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.tanks import body_of
+from tankcal.pipeline.wall_straps import typical_shape_m
 
 TOTAL, BULGES = ROWS - 1, ("barrel", "taper")
 
@@ -56,6 +60,35 @@ def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure):
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / count)
     assert min(classes) >= least_in_class(walls, len(classes))
     assert wide < 1.6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("walls", ["generated", "independent"])
+def test_the_typical_shape_is_honest_where_none_is_declared(walls, figure):
+    """The true excess of hulls of shells that are no model of the package, in units of its u."""
+    off = []
+    for seed in range(24):
+        rng = np.random.default_rng(seed)
+        if walls == "generated":
+            radius = np.exp(rng.uniform(*np.log([3, 40])))
+            wall = make_wall(rng, FAMILIES[seed % len(FAMILIES)], radius_m=radius, courses=6)
+        else:
+            wall = make_shell(rng, ("settled", "flat-plates", "filled")[seed % 3])
+        mean, sd = perimeter_excess(typical_shape_m(), wall.radius_m)
+        true = np.mean([excess_of(wall, course) for course in (0, wall.courses - 1)])
+        off.append((true - mean) / sd)
+    figure(f"error of the area term over u, rms and largest, {walls}",
+           f"{np.sqrt(np.mean(np.square(off))):.2f} {np.max(np.abs(off)):.2f}")  # fmt: skip
+    assert np.sqrt(np.mean(np.square(off))) < 1.0
+    assert np.mean(np.abs(off) < 1.96) >= 0.9
+
+
+def excess_of(wall, course, count=8192):
+    """P^2 / (4 pi A) - 1 of a level, P the perimeter of its hull."""
+    azimuth = FULL_TURN * (np.arange(count) + 0.5) / count
+    radius = wall.radius_at(np.full(count, course), np.full(count, 0.4), azimuth)
+    area = np.pi * np.mean(radius**2)
+    return girth_of(wall, course, 0.4, 0.0) ** 2 / (4 * np.pi * area) - 1
 
 
 @pytest.mark.study

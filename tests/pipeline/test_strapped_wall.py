@@ -13,6 +13,7 @@ from tankcal.errors import InputError, SolutionError
 from tankcal.pipeline.compared_courses import exchanged_courses
 from tankcal.pipeline.strapped_wall import field_of_readings, find_strapped_wall
 from tankcal.pipeline.strapping_checks import limit_of_repeats
+from tankcal.record import record_of
 from tankcal.survey.strapping import Obstruction
 
 OPEN = {0.9: 146.70404, 1.8: 293.40807, 3.6: 586.81461, 6.0: 978.05449, 8.4: 1369.27879}
@@ -324,10 +325,6 @@ def bad_level(parts):
     parts.tables["circumferences"][1][2] = 7.0
 
 
-def no_shape(parts):
-    del parts.settings["shell.shape_sd_mm"]
-
-
 def inside(parts):
     parts.settings["survey.side"] = "inside"
 
@@ -446,7 +443,6 @@ BAD = {
     "too_many_straps": too_many,
     "no_such_name": bad_course,
     "level_outside_course": bad_level,
-    "shape_not_declared": no_shape,
     "strapped_inside": inside,
     "tape_thickness_missing": no_thickness,
     "stretch_incomplete": half_stretch,
@@ -489,3 +485,14 @@ def test_what_a_master_lacks_is_told_of_the_master(tmp_path):
     places = [one.column for one in refused.value.problems]
     assert places.count("M.certified_temperature_c") == 1
     assert "T-12.certified_temperature_c" not in places
+
+
+def test_a_shape_that_nobody_declares_is_typical_and_as_uncertain_as_it_is_large(tmp_path):
+    job = tankcal.load(write_strapped_job(tmp_path, shell__shape_sd_mm=None))
+    wall = find_strapped_wall(job, lambda text: None)
+    assert wall.shape_sd_m == pytest.approx(0.0061, abs=5e-5)
+    assert 0 < wall.area_term.mean < wall.area_term.sd
+    record = record_of(tankcal.run(job))
+    assert ("area_term", "assumed") in [(one["code"], one["value"]) for one in record["choices"]]
+    smaller = replace(job, strapping=replace(job.strapping, shape_sd_m=0.002))
+    assert find_strapped_wall(smaller, lambda text: None).area_term.sd < wall.area_term.sd

@@ -380,7 +380,6 @@ BAD = {
     "tape": (LINES, 'instrument = "T-12"', 'instrument = "T-99"', ("plan.toml", "straps")),
     "targets, too": (LINES, "[lines]", "[pattern]\ngeneratrices = 8\n[lines]", None),
     "no strap": (LINES, "[[straps]]", "[[hits]]", None),
-    "no shape": (LINES, "shape_sd_mm = 4.0", "", ("plan.toml", "shell.shape_sd_mm")),
     "key": (LINES, "faces = 2", "face = 2", ("plan.toml", "lines.face")),
     "half": (LINES, "count = 12", "count = 12.5", ("plan.toml", "lines.count")),
     "many": (HITS, "hits = 20 ", "hits = 400 ", ("plan.toml", "hits")),

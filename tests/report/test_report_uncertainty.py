@@ -416,7 +416,12 @@ def test_the_differences_of_the_ends_are_drawn(record):
     [
         ([2.0, 2.0, 2.0], [None] * 3, [False] * 3, "k = 2.00, which for a normal distribution"),
         ([2.0, 2.26, 2.26], [None, 9.0, 9.0], [True, False, False], "k = 2.26, which for a t-"),
-        ([2.0, 2.26, 2.01], [None, 9.0, 4e3], [False] * 3, "ν_eff = 9 to ∞ effective"),
+        (
+            [2.0, 2.26, 2.01],
+            [None, 9.0, 4e3],
+            [False] * 3,
+            "with 9 to ∞ effective",
+        ),
         ([2.0, 2.26, 2.01], [1.0, 9.0, 4e3], [True] * 3, None),
     ],
 )

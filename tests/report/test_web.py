@@ -2,12 +2,14 @@
 
 import base64
 import hashlib
+import io
 import json
 import re
 
 import nbformat
 import numpy as np
 import pytest
+from fontTools.ttLib import TTFont
 from job_builder import write_job
 from nbformat.v4 import new_markdown_cell, new_notebook
 from paper_cells import paper_blocks
@@ -23,6 +25,7 @@ from tankcal.report.pdf import pdf
 from tankcal.report.web import page
 from tankcal.report.web.capacity_data import BEND, calculator, sources_of, straight_rows
 from tankcal.report.web.packing import script_data
+from tankcal.report.web.svg_fonts import with_fonts
 from tankcal.report.web.tables import PIECE
 from tankcal.report.web.tank_shape import tank_view
 
@@ -289,3 +292,18 @@ def test_blocks_of_the_report_are_known_to_the_exporter(found):
     assert [one["kind"] for one in blocks_of(new_notebook(cells=cells))] == [
         one["kind"] for one in found
     ]
+
+
+def test_a_chart_brings_the_letters_of_its_font():
+    """Without STIX fonts a browser would set wider labels, which overlap."""
+    svg = (
+        '<svg width="1"><text style="font: 8px \'STIXGeneral\'">U / m³ &amp; 4</text>'
+        "<text style=\"font-family: 'STIXGeneral'\">h</text></svg>"
+    )
+    made = with_fonts(svg)
+    assert made == with_fonts(svg)  # the same bytes
+    assert made.startswith('<svg width="1"><style>@font-face{font-family:STIXGeneral;src:url(data:')
+    data = re.search(r"base64,([^)]+)", made)[1]
+    letters = TTFont(io.BytesIO(base64.b64decode(data))).getBestCmap()
+    assert set("U / m³ & 4h") == set(map(chr, letters))
+    assert with_fonts("<svg><path/></svg>") == "<svg><path/></svg>"

@@ -259,7 +259,29 @@ def test_the_book_opens_on_the_dip_calculator(book):
 def test_whole_workbook_prints_certificate_and_table(book):
     """Hidden sheets are not printed with the whole workbook."""
     shown = [sheet.title for sheet in book if sheet.sheet_state == "visible"]
-    assert shown == ["Certificate", "Capacity", "Proportional parts", "Dip calculator"]
+    assert shown[:4] == ["Certificate", "Capacity", "Proportional parts", "Dip calculator"]
+    assert {"Charts", "Uncertainty budget", "Corrections"} <= set(shown)
+    assert not {"Capacity mm", "Monte Carlo", "Deviations", "Covariance factor"} & set(shown)
+
+
+def test_first_sheet_has_a_link_to_each_sheet_that_shows(book):
+    first = book["Certificate"]
+    links = {cell.value: cell.hyperlink.location for row in first for cell in row if cell.hyperlink}
+    shown = [sheet.title for sheet in book if sheet.sheet_state == "visible"]
+    assert links == {name: f"'{name}'!A1" for name in shown[1:]}
+    said = texts(first)
+    assert all(sheet.title in said for sheet in book if sheet.sheet_state != "visible")
+    assert first.print_area == f"'Certificate'!$A$1:$E${first.print_area.rpartition('$')[2]}"
+
+
+@pytest.mark.slow
+def test_headline_is_in_the_unit_of_the_job(short, tmp_path):
+    in_litres = copy.deepcopy(short)
+    in_litres["job"]["table"]["volume_unit"] = "L"
+    top = short["capacity"]["volume_m3"][-1]
+    values = [cell for row in written(in_litres, tmp_path)["Certificate"] for cell in row]
+    (headline,) = (one for one in values if one.value == pytest.approx(1000 * top, rel=1e-12))
+    assert headline.number_format.endswith('L"')
 
 
 def test_every_sheet_prints_tank_and_page(book, record):

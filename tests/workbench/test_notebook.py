@@ -115,9 +115,9 @@ def test_what_is_not_installed_is_told_in_a_line(folder, capsys, monkeypatch):
 
     monkeypatch.setattr(serving, "find_spec", lambda name: None)
     assert main(["notebook", str(folder)]) == 0
-    assert "tankcal[lab]" in capsys.readouterr().err
+    assert "jupyterlab>=" in capsys.readouterr().err
     assert main(["app", str(folder)]) == 2
-    assert "tankcal[app]" in capsys.readouterr().err
+    assert "voila>=" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import importlib
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.version import install_command
 
 OLDEST = (4, 7)  # the first one with ArucoDetector
 
@@ -18,15 +19,18 @@ def opencv():
             Problem(
                 "OpenCV",
                 message(
-                    "targets_no_opencv", "not installed; expected: pip install 'tankcal[images]'"
+                    "targets_no_opencv",
+                    "not installed; expected: {command}",
+                    command=install_command("images"),
                 ),
             )
         ) from None
     if not (is_usable and hasattr(found, "aruco")):
         expected = message(
             "targets_old_opencv",
-            "found version {version}; expected 4.7 or later: pip install 'tankcal[images]'",
+            "found version {version}; expected 4.7 or later: {command}",
             version=found.__version__,
+            command=install_command("images"),
         )
         raise InputError(Problem("OpenCV", expected))
     return found

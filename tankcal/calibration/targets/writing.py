@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tankcal.calibration.targets.found import REASONS
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, reason_of
 from tankcal.messages import message
 from tankcal.text.spreadsheets import write_guarded
 
@@ -118,7 +118,7 @@ def write_image_points(photos, path, replace=False):
             Problem(
                 Path(path).name,
                 message(
-                    "targets_not_written", "cannot be written ({reason})", reason=error.strerror
+                    "targets_not_written", "cannot be written ({reason})", reason=reason_of(error)
                 ),
             )
         ) from None

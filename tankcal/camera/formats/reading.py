@@ -15,7 +15,7 @@ from pathlib import Path
 from tankcal.camera.formats import balanced, colmap, filestorage, metashape, pix4d
 from tankcal.camera.formats.opencv import from_opencv
 from tankcal.camera.formats.texts import LONGEST, Notes, only_letters, short_text
-from tankcal.errors import SolutionError
+from tankcal.errors import SolutionError, reason_of
 from tankcal.messages import message
 from tankcal.text.decoding import decode_text
 
@@ -113,7 +113,7 @@ def _text(path, notes):
             message(
                 "convert_not_readable",
                 "cannot be read ({reason})",
-                reason=getattr(error, "strerror", None) or error,
+                reason=reason_of(error),
             )
         )
         return None

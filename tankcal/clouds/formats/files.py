@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from tankcal.clouds.contents import CloudPiece
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, reason_of
 from tankcal.messages import message
+from tankcal.version import install_command
 
 TEXT_ENDINGS = (".ptx", ".pts", ".xyz", ".asc", ".txt", ".csv")
 ENDINGS = (".las", ".laz", ".e57", ".ply", *TEXT_ENDINGS)
@@ -84,7 +85,7 @@ def open_cloud(path):
             with path.open("rb") as stream:
                 start = stream.read(SNIFFED)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
+        reason = reason_of(error)
         unreadable = message("cloud_file_unreadable", "cannot be read: {reason}", reason=reason)
         raise InputError(Problem(path.name or str(path), unreadable)) from error
     if not is_regular:
@@ -123,9 +124,9 @@ def require_library(file, module):
     if importlib.util.find_spec(module) is None:
         missing = message(
             "cloud_file_no_library",
-            "the library {library} that reads it is not installed; expected: "
-            "pip install 'tankcal[clouds]'",
+            "the library {library} that reads it is not installed; expected: {command}",
             library=module,
+            command=install_command("clouds"),
         )
         raise file.refusal(missing)
 

@@ -347,8 +347,9 @@ def _check_comparisons(table, tapes, raw, log):
 def check_strapping_settings(values, tables, registers, alone, raw, log):
     """What a strapping needs of the settings; alone: nothing else tells the wall."""
     tapes = tapes_of(registers)
+    is_lying = values["tank"]["kind"] == "horizontal"  # an upright shell has a typical shape
     unknown = values["shell"]["shape_sd_mm"] is None
-    if alone and unknown and is_not_given(raw, "shell", "shape_sd_mm"):
+    if is_lying and unknown and is_not_given(raw, "shell", "shape_sd_mm"):
         expected = message(
             "shape_not_declared",
             "missing; expected how far the wall is from a circle (0: it is one): a tape measures a"

@@ -167,9 +167,18 @@ def _told_sizes(section, names, depth_key, raw):
     if has_depth and not there:
         alone = message(
             "end_depth_alone",
-            "missing; expected it beside the depth of a torispherical end, or one of its radii",
+            "missing; expected one of {names} beside the depth of a torispherical end, or one of "
+            "its radii",
+            names=list(STANDARDS),
         )
         return [], [(names["standard"], alone)]
+    if not there:
+        neither = message(
+            "end_standard_missing",
+            "missing; expected one of {names} for a torispherical end, or its two radii",
+            names=list(STANDARDS),
+        )
+        return [], [(names["standard"], neither)]
     if has_depth and len(there) == 2:
         over = message(
             "end_sizes_over",

@@ -31,7 +31,7 @@ TABLE = (
     ),
     choice(
         "volume_unit",
-        "of the printed table: m3, L, or bbl (42 US gallons); blank: m3",
+        "of all volumes in the report: m3, L, or bbl (42 US gallons); blank: m3",
         ("m3", "L", "bbl"),
     ),
     positive("fine_step_m", "smaller step within fine_zones, metres"),

@@ -134,7 +134,7 @@ KEYS = {
             "shape_sd_mm",
             "number",
             "standard deviation of the radius round the wall, millimetres: how far from a circle a"
-            " strapped shell is; needed with circumferences",
+            " strapped shell is; blank: 6.1, as shells typically have (needed for a lying tank)",
             kinds=STRAPPED,
             low=0,
             high=300,

@@ -84,7 +84,7 @@ def _write_entry(sheet, row, owner, entry, texts, look):
     sheet.write_string(row, _KEY, field.name, look.code)
     cell = look.cell(type_of_cell(field), entry.is_to_fill_in)
     _write_start(sheet, row, field, texts.value(field, entry.start), cell)
-    _write_example(sheet, row, texts.value(field, entry.example), look)
+    _write_example(sheet, row, texts.example(field, entry.example), look)
     rule = rule_of(field, field.choices, xl_rowcol_to_cell(row, _VALUE), texts)
     if rule is not None:
         sheet.data_validation(row, _VALUE, row, _VALUE, rule)

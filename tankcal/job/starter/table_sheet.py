@@ -89,7 +89,7 @@ def _write_examples(sheet, fields, examples, texts, look):
     for row, example in enumerate(examples, FIRST_EXAMPLE):
         sheet.write_string(row, 0, f"{MARK} {texts.of('cover', 'example')}", look.mark)
         for column, field in enumerate(fields, 1):
-            value = texts.value(field, example.get(field.name))
+            value = texts.example(field, example.get(field.name))
             if isinstance(value, str):
                 sheet.write_string(row, column, value, grey)
             elif value is not None:

@@ -163,6 +163,11 @@ class Texts:
         """What stands in a cell of a field: its choices in the words of the form."""
         return self.choice(given) if field.kind in ("choice", "flag") else given
 
+    def example(self, field, given):
+        """An example of a field in the words of the form."""
+        known = self.words["input"]["examples"]
+        return known.get(given, self.value(field, given)) if isinstance(given, str) else given
+
     def input_note(self, name, declarable):
         """What an input of uncertainty is."""
         if self.words["language"]["code"] == DEFAULT:

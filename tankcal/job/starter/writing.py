@@ -7,7 +7,7 @@ import json
 import re
 from pathlib import Path
 
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, reason_of
 from tankcal.job.contract import columns_of
 from tankcal.job.contract.keys import CSV
 from tankcal.job.starter.book import book_bytes
@@ -269,6 +269,6 @@ def _unwritten(path, error):
     return InputError(
         Problem(
             path.name,
-            message("file_unwritten", "cannot be written ({reason})", reason=error.strerror),
+            message("file_unwritten", "cannot be written ({reason})", reason=reason_of(error)),
         )
     )

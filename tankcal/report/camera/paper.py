@@ -4,7 +4,7 @@ import hashlib
 from pathlib import Path
 
 import tankcal
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, reason_of
 from tankcal.messages import message
 from tankcal.record.camera_versions import CAMERA
 from tankcal.report import blocks
@@ -25,7 +25,9 @@ def load(path):
         result = read_json(path)
     except (OSError, ValueError, RecursionError) as error:
         expected = message(
-            "camera_result_unreadable", "cannot be read as a result: {error}", error=str(error)
+            "camera_result_unreadable",
+            "cannot be read as a result: {error}",
+            error=reason_of(error),
         )
         raise InputError(Problem(name, expected)) from error
     return CAMERA.migrated(result, name)

@@ -148,16 +148,17 @@ def _matrix(paper, budgets):
     rows = [list(row) for row in zip([*names, *totals], *columns, strict=True)]
     heads = [paper.word("table_headings.input"), *(_dips(paper, one) for one in budgets)]
     align = ["left", *["decimal"] * len(budgets)]
-    caption = paper.word("captions.budget_matrix")
+    caption = paper.word("captions.budget_matrix", unit=paper.volume_symbol)
     return blocks.table(heads, rows, caption, align, paper.marks.decimal)
 
 
 def _contributions(paper, one, names):
-    digits = decimals_of(one["u_m3"])
-    known = {paper.input_name(line): line["contribution_m3"] for line in one["lines"]}
+    factor = paper.volume_factor
+    digits = decimals_of(factor * one["u_m3"])
+    known = {paper.input_name(line): factor * line["contribution_m3"] for line in one["lines"]}
     texts = [fixed(known.get(name), digits + 1, paper.marks) for name in names]
     k = fixed(one["k"], 2, paper.marks)
-    u, U = (fixed(one[key], digits, paper.marks) for key in ("u_m3", "U_m3"))
+    u, U = (fixed(factor * one[key], digits, paper.marks) for key in ("u_m3", "U_m3"))
     return [*texts, u, k, U]
 
 

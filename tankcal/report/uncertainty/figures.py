@@ -41,9 +41,11 @@ def delivery_curve(paper):
         (delivered, {"color": INK}, "delivery_from_full"),
         (worst, {"color": RED, "marker": "o", "markersize": 3, "linestyle": ""}, "worst"),
     ):
-        left.plot(one["height"], one["u"], label=paper.word(f"axes.{name}"), **look)
+        left.plot(
+            one["height"], paper.volume_factor * one["u"], label=paper.word(f"axes.{name}"), **look
+        )
         right.plot(one["height"], 100 * one["u"] / one["volume"], **look)
-    left.set_ylabel(paper.word("axes.u_m3"))
+    left.set_ylabel(paper.word("axes.u_m3").replace("m³", paper.volume_symbol))
     left.set_ylim(bottom=0)
     right.set_ylabel(paper.word("axes.u_percent"))
     right.set_yscale("log")

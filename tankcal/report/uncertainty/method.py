@@ -172,7 +172,9 @@ def _with_u(paper, line):
 
 
 def _with_unit(paper, u, unit):
-    """Two digits of an uncertainty, with its unit as the record writes it."""
+    """Two digits of an uncertainty, with its unit as the record writes it, volumes as on paper."""
+    if unit == "m3":
+        return paper.number(u, unit, digits=2)
     text, shown = paper.number(u, digits=2), numbers.symbol(unit)
     return f"{text}\N{NO-BREAK SPACE}{shown}" if shown else text
 

@@ -182,7 +182,7 @@ def _dips(paper, one):
 def _room(paper, one):
     """How far a volume may be from the stated one."""
     if one["limit"] is None:
-        return paper.plain(one["limit_m3"], numbers.unit("m3").symbol)
+        return paper.plain(one["limit_m3"] * paper.volume_factor, paper.volume_symbol)
     return paper.word("texts.limit_of_stated", limit=paper.percent(one["limit"]))
 
 

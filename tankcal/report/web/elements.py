@@ -3,6 +3,7 @@
 import base64
 from html import escape
 
+from tankcal.report.web.svg_fonts import with_fonts
 from tankcal.report.web.tables import caption_of, table_html
 
 
@@ -109,6 +110,7 @@ def _figure(block):
 def _data_url(kind, content):
     """A picture, the text of an SVG or a PNG in base64, as an address that holds it whole."""
     if kind == "svg":
+        content = with_fonts(content)
         content = base64.b64encode(content.encode("utf-8")).decode("ascii")
     return f"data:{_MIME[kind]};base64,{escape(content)}"
 

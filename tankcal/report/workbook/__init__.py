@@ -43,15 +43,10 @@ from tankcal.report.workbook.uncertainty import (
 )
 from tankcal.text.words import language_of, load_words, translate_record
 
-# What a gauger uses and an owner prints. The others are for reviewers and programs, and hidden:
-# printed with the whole workbook they are hundreds of pages.
-_SHOWN_OF_TANK = (
-    "certificate",
-    "capacity",
-    "proportional_parts",
-    "other_densities",
-    "dip_calculator",
-    "ship",
+# Hundreds of pages when the whole workbook is printed, and read by programs: these are hidden.
+_HIDDEN = (
+    *("capacity_mm", "workings", "covariance_factor", "monte_carlo", "points", "adjusted_points"),
+    *("observations", "deviations", "liquid_steps"),
 )
 _OF_SURVEYS = {  # sheets of what a wall was surveyed with, by the part of the record
     "strapping": strapping_sheet,
@@ -64,7 +59,6 @@ _OF_SURVEYS = {  # sheets of what a wall was surveyed with, by the part of the r
     "radii": radii_sheet,
     "ship": ship_sheet,
 }
-_SHOWN_OF_SURVEY = ("adjustment", "points", "provenance")
 
 
 def write(record, path, language=None, digest=None):
@@ -78,14 +72,15 @@ def write(record, path, language=None, digest=None):
     """
     words = load_words(language or language_of(record))
     record = translate_record(words, record)
-    shown = _SHOWN_OF_TANK if record["capacity"] else _SHOWN_OF_SURVEY
-    with Book(path, record, words, shown=shown) as book:
+    hidden = _HIDDEN if record["capacity"] else ("observations",)
+    with Book(path, record, words, hidden=hidden) as book:
         if digest:
             book.name_record(digest)
         if record["capacity"]:
             _sheets_of_tank(book, record)
         else:
             _sheets_of_survey(book, record)
+        book.write_index()
 
 
 def _sheets_of_tank(book, record):

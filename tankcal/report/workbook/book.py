@@ -25,6 +25,7 @@ from tankcal.report.workbook.writer import Writer
 
 RECORD_PROPERTY = "record.json SHA-256"  # `tankcal verify` looks for it
 _A4 = 9
+_INDEX_ROW, _INDEX_WIDTH = 2, 34  # of the list of sheets
 _PAGE_PT = (750.0, 480.0)  # of A4 in landscape, within the margins
 _COLUMN_PT, _BESIDE_PT = 5.25, 3.75  # of a unit of width; beside it
 _TAB = {"result": ACCENT, "input": "#C98A00", "paper": "#8FA3B8", "origin": "#5F7A61"}
@@ -60,12 +61,12 @@ class Book(Writer):
     notice   of the certificate, on every sheet; "" for none
     about    "capacity", "adjustment", "plan" or "comparison", by which the file is called; None: by
              the record
-    shown    codes of the sheets that show, and are printed with the whole workbook; None: all
+    hidden   codes of the sheets that are hidden, and not printed with the whole workbook
     """
 
-    def __init__(self, path, record, words, about=None, shown=None):
+    def __init__(self, path, record, words, about=None, hidden=()):
         self._path, self._record = path, record
-        self._shown = shown
+        self._hidden, self._sheets = hidden, []
         options = {
             "strings_to_formulas": False,
             "strings_to_urls": False,
@@ -134,6 +135,23 @@ class Book(Writer):
         sheet.write_string(1, 0, line, self.format(font_color=MUTED))
         return sheet
 
+    def write_index(self):
+        """Links to all sheets that show, right of what the first sheet prints, and the others."""
+        (_, first), *others = self._sheets
+        column = first.dim_colmax + 2
+        first.print_area(0, 0, first.dim_rowmax, first.dim_colmax)
+        first.set_column(column, column, _INDEX_WIDTH)
+        head, link = self.format(bold=True, font_color=ACCENT), self.format(font_color=ACCENT)
+        first.write_string(_INDEX_ROW, column, self.word("labels.index"), head)
+        shown = [sheet.get_name() for code, sheet in others if code not in self._hidden]
+        for row, name in enumerate(shown, _INDEX_ROW + 1):
+            first.write_url(row, column, f"internal:'{name}'!A1", link, name)
+        names = [sheet.get_name() for code, sheet in others if code in self._hidden]
+        row = _INDEX_ROW + len(shown) + 2
+        for text in [self.word("labels.index_hidden"), *names] if names else ():
+            first.write_string(row, column, text, self.format(font_color=MUTED))
+            row += 1
+
     def plain_sheet(self, code, columns, landscape=False, tab="origin"):
         """A protected sheet of nothing but columns, headings in row 1: for other programs to read.
 
@@ -163,7 +181,8 @@ class Book(Writer):
         """A new protected sheet with page set-up, header and footer."""
         name = self.sheet_name(code)
         sheet = self._file.add_worksheet(name, Sheet)
-        if self._shown is not None and code not in self._shown:
+        self._sheets.append((code, sheet))
+        if code in self._hidden:
             sheet.hide()
         sheet.hide_gridlines(2)
         sheet.set_default_row(ROW_PT)

@@ -122,7 +122,8 @@ def _result(book, sheet, row, record):
     """The capacity at the top of the table with U and k on its line; returns the next row."""
     capacity, words = record["capacity"], book.words
     U, k = stated_U_m3(capacity)[-1], k_of_rows(capacity)[-1]
-    cubic = number_format(decimals_of(U), unit="m³")
+    volume = unit(record["job"]["table"]["volume_unit"])
+    cubic = number_format(decimals_of(volume.factor * U), unit=volume.symbol)
     top = number_format(decimals_of_height(capacity["height_m"][-1]), unit="m")
     book.heading(sheet, row, sentence(words, "headings", "result"), len(_WIDTHS))
     lines = []
@@ -137,7 +138,7 @@ def _result(book, sheet, row, record):
     book.put(sheet, row + 2, 0, book.word("labels.top_of_table"), **line)
     k = words["intervals"]["monte_carlo"] if k is None else k
     for column, value, shown in (
-        (1, capacity["volume_m3"][-1], cubic),
+        (1, volume.factor * capacity["volume_m3"][-1], cubic),
         (2, U, f'"± "{cubic}'),
         (3, k, '"k = "0.00'),
         (4, capacity["height_m"][-1], top),

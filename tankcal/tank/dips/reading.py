@@ -6,6 +6,7 @@ import numpy as np
 
 from tankcal.errors import HeightError
 from tankcal.messages import message
+from tankcal.text.digits import PROGRAM, format_with_u
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,19 @@ class Dips:
 
     height_m: np.ndarray
     u_m: np.ndarray
+
+    def __str__(self):
+        """One line for each dip: "6.4213 m, u = 0.0021 m"."""
+        return "\n".join(map(_line_of, self.height_m, self.u_m))
+
+    def __repr__(self):
+        """The lines of `str`, as an interpreter shows them."""
+        return str(self)
+
+
+def _line_of(height_m, u_m):
+    shown = format_with_u(height_m, u_m, PROGRAM, least=3)
+    return f"{shown.value} m, u = {shown.uncertainty} m"
 
 
 def ullage_m(reference_height_m, dip_m):
@@ -73,6 +87,8 @@ def dips_of(height_m, volume_m3, factor_m3, wanted_m3):
     Examples
     --------
     >>> found = dips_of([0.0, 1.0, 2.0], [0.0, 50.0, 100.0], [[0.1], [0.1], [0.1]], 75.0)
+    >>> found
+    1.5000 m, u = 0.0020 m
     >>> found.height_m, found.u_m
     (array([1.5]), array([0.002]))
     """

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tankcal.errors import reason_of
 from tankcal.messages import message
 from tankcal.tank.meshes.checks import closed_mesh, problem
 
@@ -83,7 +84,8 @@ def read_mesh(path, unit_m=1.0):
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise problem(path.name, f"cannot be read: {error.strerror}") from error
+        text = message("mesh_file_unreadable", "cannot be read: {reason}", reason=reason_of(error))
+        raise problem(path.name, text) from error
     return parse_mesh(path.name, data, unit_m)
 
 
