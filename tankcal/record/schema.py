@@ -8,7 +8,7 @@ has None. A Message `x` is written as `x`, and as `x_code` and `x_values` at the
 import re
 import types
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
-from functools import cache
+from functools import cache, partial
 from inspect import getdoc
 from itertools import chain
 from math import isfinite
@@ -371,23 +371,33 @@ def from_plain(cls, data, name="data"):
 
 
 def _made(kind, data):
+    make = _maker(kind)
+    return data if make is None else make(data)
+
+
+@cache  # a table has millions of numbers of a few types
+def _maker(kind):
+    """The function that makes a value of a type from plain data; None: the plain data are it."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
-        return data if isinstance(arguments[1], Columns) else _made(arguments[0], data)
+        return None if isinstance(arguments[1], Columns) else _maker(arguments[0])
     if origin in (Union, types.UnionType):
         others = [one for one in arguments if one is not type(None)]
-        return data if data is None or len(others) > 1 else _made(others[0], data)
+        make = None if len(others) > 1 else _maker(others[0])
+        return make and (lambda data: None if data is None else make(data))
     if kind is float:
-        return np.nan if data is None else float(data)
+        return lambda data: np.nan if data is None else float(data)
     if is_dataclass(kind):
-        return _object(kind, data)
+        return partial(_object, kind)
     if origin in (tuple, list):
-        kinds = arguments if len(arguments) > 1 and Ellipsis not in arguments else arguments[:1]
-        kinds = kinds if len(kinds) > 1 else kinds * len(data)
-        return origin(_made(one, item) for one, item in zip(kinds, data, strict=True))
+        if len(arguments) > 1 and Ellipsis not in arguments:
+            pairs = partial(zip, arguments, strict=True)
+            return lambda data: origin(_made(one, item) for one, item in pairs(data))
+        make = _maker(arguments[0])
+        return origin if make is None else (lambda data: origin(map(make, data)))
     if kind is np.ndarray:
-        return _array_of(data)
-    return tuple(data) if kind is tuple else data
+        return _array_of
+    return tuple if kind is tuple else None
 
 
 def _array_of(data):
