@@ -20,7 +20,6 @@ from tankcal.cli.showing import (
 )
 from tankcal.errors import Problem, SolutionError, problem_of
 from tankcal.messages import message
-from tankcal.tank.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
 from tankcal.text.digits import (
     decimals_of,
     decimals_of_height,
@@ -249,6 +248,8 @@ def _capacity(result):
 
 def _volume_unit(name):
     """(a unit of volumes as the terminal shows it, its factor from m3, decimals of a row)."""
+    from tankcal.tank.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
+
     shown = message("cubic_metres", "m3") if name == "m3" else name
     return shown, float(1 / VOLUME_UNITS_M3[name]), TABLE_DECIMALS[name]
 

@@ -271,7 +271,7 @@ def test_study_of_random_codes(figure):
     Of 500 some 30 are by chance (standard error 5), of 1500 some 92 (9).
     """
     rng = np.random.default_rng(0)
-    known, count, read = dictionary_of("DICT_4X4_1000"), draws(500, 1500), 0
+    known, count, read = dictionary_of("DICT_4X4_1000"), draws(200, 1500), 0
     for _ in range(count // 25):
         sheet = np.full((400, 400), 200.0)
         for place in range(25):

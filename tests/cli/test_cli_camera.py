@@ -522,6 +522,7 @@ def test_papers_name_their_source(tmp_path):
 def test_check_of_a_file_as_excel_writes_it_in_brazil(tmp_path, capsys):
     file = tmp_path / "d.csv"
     file.write_text("point;dx_m\nA;0,01\nB;-0,02\nC;0,005\n", encoding="utf-8")
-    assert run("check", file) == 2
+    assert run("check", file, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["n"] == 3
     assert run("check", file, "--separator", ";", "--decimal", ",", "--json") == 0
     assert json.loads(capsys.readouterr().out)["n"] == 3

@@ -119,7 +119,7 @@ def test_runs_that_are_ended_lose_nothing(job):
 @needs_signals
 @pytest.mark.study
 def test_runs_that_are_ended_lose_nothing_study(job):
-    assert {143, -signal.SIGKILL} <= end_runs(job, draws(40, 1000), np.random.default_rng(2))
+    assert {143, -signal.SIGKILL} <= end_runs(job, draws(16, 1000), np.random.default_rng(2))
 
 
 @pytest.mark.slow

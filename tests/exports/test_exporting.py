@@ -94,9 +94,9 @@ def test_the_bound_holds_at_any_dip(shape, tmp_path):
 @pytest.mark.study
 @pytest.mark.parametrize("step", STEPS)
 def test_the_bound_holds_on_all_tables_of_the_linter(step, tmp_path, figure):
-    """216 tables of 18 shapes, so many dips each, three rounding steps; truth: closed forms."""
+    """18 shapes (in CI five), so many dips each, three rounding steps; truth: closed forms."""
     most = 0.0
-    for n, (volume, top) in enumerate(SHAPES.values()):
+    for n, (volume, top) in list(enumerate(SHAPES.values()))[:: draws(4, 1)]:
         path = exact_record(tmp_path, volume, table_heights(STEPS[step], top), EDGES)
         for decimals in DECIMALS:
             profile = replace(OURS, volume_decimals=decimals)

@@ -141,7 +141,9 @@ def test_pipes_and_a_ladder_beside_a_seam_go():
 def test_seams_of_every_shape_are_in_the_table(tmp_path, figure):
     """Of 20 000 points: 40 mm, 0.2 to 0.8 m wide, up the shell and over one course."""
     held, lost = [], []
-    sizes = product(draws((1,), (1, 2, 3, 4)), SHAPES, (0.2, 0.4, 0.8), (-0.04, 0.04), (None, 2))
+    sizes = product(
+        draws((1,), (1, 2, 3, 4)), SHAPES, (0.2, 0.4, 0.8)[:: draws(2, 1)], (-0.04, 0.04), (None, 2)
+    )
     for seed, shape, width, depth, course in sizes:
         seams = pair(depth, width, shape, course)
         gone, _, off, expanded = of_scan(seed, seams, [], tmp_path)

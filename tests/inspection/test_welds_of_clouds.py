@@ -392,7 +392,7 @@ def test_peak_in_ten_million_points(figure):  # the whole tank of the page
 def test_coverage_with_noise_that_hangs_together(knots_m, figure):
     """Truth: the form; the noise is no model of the package: 1 mm of 2.2 mm hang together."""
     inside, off, flat = [], [], []
-    for seed in range(draws(8, 40)):
+    for seed in range(draws(4, 40)):
         rng = np.random.default_rng(seed)
         peaks = [
             Peak(c, at + c, size, rng.uniform(0.08, 0.3))

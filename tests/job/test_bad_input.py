@@ -149,9 +149,9 @@ BAD_CELLS = [
     ("uncertainty", 2, "distribution", "flat", "rectangular"),
     ("uncertainty", 3, "input", "scale", "already in row 2"),
     ("uncertainty", 2, "u", "nan", "expected a number"),
-    ("uncertainty", 2, "u", "5,5", "expected a number"),
+    ("uncertainty", 2, "u", "5..5", "expected a number"),
     ("uncertainty", 2, "u", None, "blank"),
-    ("uncertainty", 2, "u_is", "half-width", "did you mean half_width?"),
+    ("uncertainty", 2, "u_is", "half_widht", "did you mean half_width?"),
     ("uncertainty", 3, "u_is", None, "expected scale or sd"),
     ("uncertainty", 3, "u_is", "standard", "expected scale or sd"),
     ("uncertainty", 3, "u_is", "half_width", "expected scale or sd"),
@@ -166,7 +166,7 @@ BAD_CELLS = [
     ("uncertainty", 5, "distribution", "rectangular", "expected normal or a blank"),
     ("correlations", 2, "r", 1.2, "a number from -1 to 1"),
     ("correlations", 2, "r", "NaN", "expected a number"),
-    ("correlations", 2, "r", "0,5", "expected a number"),
+    ("correlations", 2, "r", "0..5", "expected a number"),
     ("correlations", 2, "r", None, "blank"),
     ("correlations", 2, "input", "wind", "expected 'scale'"),
     ("correlations", 2, "with", "rounding", "expected 'scale'"),
@@ -175,7 +175,7 @@ BAD_CELLS = [
     ("correlations", 3, "with", "scale", "already in row 2"),
     ("stated", 2, "high_m", 95.0, "expected at most 9.5, the top of the tank"),
     ("stated", 2, "high_m", None, "blank"),
-    ("stated", 2, "high_m", "9,0", "expected a number"),
+    ("stated", 2, "high_m", "9..0", "expected a number"),
     ("stated", 2, "high_m", -1.0, "above 0"),
     ("stated", 2, "low_m", 9.0, "expected a dip below high_m = 9"),
     ("stated", 2, "low_m", 9.2, "expected a dip below high_m = 9"),
@@ -257,13 +257,13 @@ def test_bad_cell_is_reported_with_its_row_and_column(
 @pytest.mark.parametrize("form", FORMS)
 def test_missing_unknown_and_repeated_columns(tmp_path, form):
     parts = job_parts()
-    parts.tables["points"][0] = ["point", "x_m", "y_m", "height"]
+    parts.tables["points"][0] = ["point", "x_m", "y_m", "hoogte"]
     parts.tables["courses"][0] = ["course", "height_m", "height_m"]
     problems = problems_of(write(tmp_path, parts, form))
     points, courses = table_file(form, "points"), table_file(form, "courses")
     assert places(problems) == [
         (courses, 1, "height_m"),
-        (points, 1, "height"),
+        (points, 1, "hoogte"),
         (points, 1, "z_m"),
     ]
 

@@ -34,6 +34,7 @@ LEAST_HELD, WIDEST, MOST_BIASED = 0.92, 1.5, 2.5  # share, mean U over 1.96 rms,
 # U of one height a course covers a bulge as the surveyed shell has it; these shells have less of it
 WIDE = {"points, one ring": 2.5, "straps, one a course": 4.0}
 IN_CI, FULL = 10, 200  # shells of each method
+LONG = ("tangents", "hits, untied set-ups outside")  # seconds a shell
 
 
 def _points(rings, rng, shell, folder):
@@ -232,7 +233,7 @@ def test_intervals_hold_on_independent_shells(tmp_path, figure, method):
 @pytest.mark.study
 @pytest.mark.parametrize("method", SURVEYS)
 def test_intervals_hold_on_independent_shells_study(tmp_path, figure, method):
-    shells = draws(10, FULL)
+    shells = draws(IN_CI if method in LONG else 30, FULL)
     each = study(method, shells, tmp_path, figure)
     assert all(one.found is not None for one in each)
     assert not any(one.is_silent for one in each)

@@ -210,7 +210,7 @@ BAD = [
      "horizontal.tube_angle_deg", "round"),
     ("horizontal", {"tube_angle_deg": 85}, "horizontal.tube_angle_deg", "60"),
     ("bottom", {"form": "ellipsoidal"}, "bottom.centre_z_m", "missing"),
-    ("bottom", {"form": "torispherical"}, "bottom.dish_radius_m", "missing"),
+    ("bottom", {"form": "torispherical"}, "bottom.standard", "din_28011"),
     ("bottom", {"form": "torispherical", "dish_radius_m": 6.0, "knuckle_radius_m": 1.0},
      "bottom.dish_radius_m", "more than half"),
     ("bottom", {"form": "cone", "centre_z_m": -70.0}, "bottom.centre_z_m", "65 m below"),

@@ -6,12 +6,14 @@ import os
 import shutil
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import openpyxl
 import pytest
 from compared_tables import plain
+from draws import draws
 from job_builder import write_job, write_workbook
 from test_adjustment_outputs import write_station
 
@@ -272,8 +274,11 @@ def _stream_of(data):
 FORGERIES = {"report.html": in_page, "capacity.xlsx": in_workbook, "certificate.pdf": in_pdf}
 
 
-@pytest.mark.parametrize("other", ["another typst", "a later tankcal", "nothing"])
-@pytest.mark.parametrize("name", FORGERIES)
+@pytest.mark.parametrize(("name", "other"), draws(
+    [("report.html", "another typst"), ("capacity.xlsx", "a later tankcal"),
+     ("certificate.pdf", "nothing")],
+    list(product(FORGERIES, OTHERS)),
+))  # fmt: skip
 def test_forged_papers_of_another_maker_are_told_of(job, capsys, name, other):
     """The forger alters a paper, writes its hash again, and says that another version made it."""
     results = job / "results"

@@ -73,7 +73,7 @@ def test_baarda_power_at_full_size(what, figure):
     of these, 2 %, was the band of the part); the mean and the sd of w say more: 2.5 of their
     standard errors are 0.08 and 0.056, and 0.08 is 2.2 % of what is found.
     """
-    blunders = draws(500, 2500)
+    blunders = draws(250, 2500)
     w = w_of_blunders(what, blunders)
     found = np.mean(w > CRITICAL)
     figure(f"{blunders} blunders of the minimal detectable size, {what}: found", f"{found:.4f}")
@@ -139,7 +139,7 @@ def test_false_alarms_at_full_size(name, figure):
 
     The latter's standard error is 0.7 % of 500 surveys, 0.5 % of 1000; the band is the same.
     """
-    surveys = draws(500, 1000)
+    surveys = draws(250, 1000)
     found = alarms(name, surveys)
     w, tau = 1e3 * found.w.mean(), 1e3 * found.tau.mean()
     figure(
@@ -203,7 +203,7 @@ def variance_factors(name, surveys, seed=3):
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize(
-    "surveys", [pytest.param(draws(500, 1000), marks=pytest.mark.study), 50], ids=["many", "50"]
+    "surveys", [pytest.param(draws(250, 1000), marks=pytest.mark.study), 50], ids=["many", "50"]
 )
 def test_variance_components_are_unbiased(name, surveys, figure):
     """Closed form: the expectation of v'Pv of a group is its redundancy."""
