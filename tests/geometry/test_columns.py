@@ -128,7 +128,7 @@ def test_seams_at_random_places_are_within_u(shape, tmp_path, figure):
     surveys of another two is 1.07 U off.
     """
     rng, off = np.random.default_rng(5), []
-    for _ in range(draws(8, 40)):
+    for _ in range(draws(4, 40)):
         wall = wall_of([Seam(at, -0.04, 0.8, shape) for at in rng.uniform(0, 2 * np.pi, 2)])
         measured = survey(rng, wall, rings=3, points=72, noise_m=1e-3)
         error, expanded, _ = judged(wall, measured, tmp_path)
@@ -181,7 +181,7 @@ def test_seams_and_fittings_that_look_alike_are_within_u(tmp_path, figure):
     """24 to 72 points a ring, one to three rings: seams, fittings, both, and neither."""
     for kind in ("seams", "fittings", "both", "plain"):
         found = []
-        for seed in range(draws(15, 300)):
+        for seed in range(draws(8, 300)):
             scene = make_scene(np.random.default_rng([17, seed]), kind)
             found.append(judged(scene.wall, scene.survey, tmp_path)[:2])
         off, expanded = np.array(found).T

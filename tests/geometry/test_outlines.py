@@ -141,7 +141,7 @@ def test_a_smoothed_area_is_covered_by_its_uncertainty(figure):
 @pytest.mark.study
 def test_a_smoothed_area_is_covered_by_its_uncertainty_study(figure):
     """Simulation, 95 % within 3 binomial standard errors: 0.6 % of 1200 tanks, 0.3 % of 4000."""
-    tanks = draws(1200, 4000)
+    tanks = draws(600, 4000)
     part = coverage(tanks)
     figure(f"coverage of 95 % intervals, smoothed area with a gap, {tanks} tanks", f"{part:.4f}")
     assert abs(part - 0.95) < 3 * np.sqrt(0.95 * 0.05 / tanks)

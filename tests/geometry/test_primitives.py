@@ -484,7 +484,7 @@ def test_coverage_of_the_sds_a_twentieth(simulate, figure):
 @pytest.mark.parametrize("simulate", SIMULATIONS)
 def test_coverage_of_the_sds(simulate, figure):
     """Standard errors of 700 and 2000: of a coverage 0.8 and 0.5 %, of the form 3.8 and 2.2 %."""
-    check_coverage(simulate, draws(700, 2000), figure)
+    check_coverage(simulate, draws(300, 2000), figure)
 
 
 @pytest.mark.slow

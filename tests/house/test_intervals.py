@@ -94,7 +94,7 @@ def random_job(rng):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "seed", [1, *(pytest.param(n, marks=pytest.mark.study) for n in range(2, draws(14, 40)))]
+    "seed", [1, *(pytest.param(n, marks=pytest.mark.study) for n in range(2, draws(8, 40)))]
 )
 def test_intervals_of_random_jobs_in_everything_that_is_written(seed, tmp_path):
     """Property: what is written of a volume holds it, and has a width where anything is unsure."""

@@ -50,7 +50,7 @@ def _excesses(family, count):
 
 @pytest.mark.study
 def test_the_bias_at_few_heights_depends_on_the_kind_of_shell_study(figure):
-    count, at = draws(12, 60), {}
+    count, at = draws(6, 60), {}
     for family in (*INDEPENDENT, *WITHOUT_BULGE):
         at[family] = _excesses(family, count)
         for name, those in at[family].items():
@@ -72,7 +72,7 @@ def test_a_correction_by_the_prior_mean_is_too_large_study(tmp_path, monkeypatch
     """Surveys of one ring at mid course: corrected, the rms error is larger than before."""
     monkeypatch.setitem(generated_walls.RINGS, 1, ((0.5,),))
     found = []
-    for seed in range(draws(8, 60)):
+    for seed in range(draws(4, 60)):
         rng = np.random.default_rng([99, seed])
         shell = make_shell(rng, family)
         points = int(rng.choice([12, 24, 36]))

@@ -383,4 +383,4 @@ def test_surveys_scatter_as_one_of_them_says(job, figure):
 
 @pytest.mark.study
 def test_surveys_scatter_as_predicted_study(job, figure):
-    check_surveys(job, draws(60, 1000), figure)
+    check_surveys(job, draws(30, 1000), figure)

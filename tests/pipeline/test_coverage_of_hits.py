@@ -55,7 +55,7 @@ def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure, straps
 @pytest.mark.study
 @pytest.mark.parametrize("straps", [False, True])
 def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure, straps):
-    walls = draws(2, 100)
+    walls = draws(1, 100)
     of = partial(found_of, straps=straps)
     parts, wide, classes = study(walls, tmp_path, figure, found_of=of)
     count = walls * len(classes)

@@ -73,7 +73,7 @@ def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure, method
 @pytest.mark.study
 @pytest.mark.parametrize("method", JOBS)
 def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure, method):
-    walls = draws(2, 50)
+    walls = draws(1, 50)
     parts, _, classes = study(walls, tmp_path, figure, found_of=partial(found_of, method=method))
     count = walls * len(classes)
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / count)

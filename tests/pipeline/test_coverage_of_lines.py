@@ -51,7 +51,7 @@ def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure):
 
 @pytest.mark.study
 def test_intervals_hold_with_a_declared_collimation_study(tmp_path, figure):
-    walls = draws(2, 100)
+    walls = draws(1, 100)
     parts, wide, classes = study(walls, tmp_path, figure, found_of=partial(found_of, faces=1))
     count = walls * len(classes)
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / count)

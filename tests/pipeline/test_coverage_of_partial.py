@@ -70,7 +70,7 @@ def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure):
 
 @pytest.mark.study
 def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure):
-    walls = draws(8, 200)
+    walls = draws(4, 200)
     parts, wide, classes = study(walls, tmp_path, figure, rings=(1, 2), found_of=found_of)
     count = walls * len(classes)
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / count)

@@ -98,7 +98,7 @@ def test_intervals_hold_on_solids_that_are_not_the_model(kind, tmp_path, figure)
 @pytest.mark.study
 @pytest.mark.parametrize("kind", ["lying", "sphere"])
 def test_intervals_hold_on_solids_that_are_not_the_model_study(kind, tmp_path, figure):
-    held, wide = study(kind, draws(12, 100), tmp_path, figure, seed=31)
+    held, wide = study(kind, draws(6, 100), tmp_path, figure, seed=31)
     least = LEAST_HELD - 3 * np.sqrt(0.95 * 0.05 / len(held))
     assert held[:, -1].mean() > least
     assert held.mean() > least

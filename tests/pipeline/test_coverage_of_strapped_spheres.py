@@ -71,7 +71,7 @@ def test_intervals_hold_on_strapped_spheres(figure):
 
 @pytest.mark.study
 def test_intervals_hold_on_strapped_spheres_study(figure):
-    held = study(draws(20, 150), figure, 17)
+    held = study(draws(10, 150), figure, 17)
     least = LEAST_HELD - 3 * np.sqrt(0.95 * 0.05 / len(held))
     assert held[:, -1].mean() > least
     assert held.mean() > least

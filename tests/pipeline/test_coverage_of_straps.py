@@ -54,7 +54,7 @@ def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure):
 
 @pytest.mark.study
 def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure):
-    walls = draws(4, 200)
+    walls = draws(2, 200)
     parts, wide, classes = study(walls, tmp_path, figure, found_of=found_of)
     count = walls * len(classes)
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / count)
@@ -95,7 +95,7 @@ def excess_of(wall, course, count=8192):
 def test_without_the_area_term_intervals_hold_less_study(tmp_path, figure):
     """Walls with seams that do not bulge, as is said of them: what is left is the area term."""
     found = {1.0: [], 0.0: []}
-    for seed in range(draws(30, 1000)):
+    for seed in range(draws(15, 1000)):
         rng = np.random.default_rng(seed)
         radius = rng.uniform(3.5, 5.5)
         wall = make_wall(rng, "coil", radius_m=radius, courses=6, bulge=False)

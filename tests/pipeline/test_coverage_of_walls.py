@@ -108,7 +108,7 @@ def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure):
 
 @pytest.mark.study
 def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure):
-    walls = draws(6, 200)
+    walls = draws(3, 200)
     parts, wide, classes = study(walls, tmp_path, figure)
     count = walls * len(classes)
     assert min(parts) > LEAST_HELD - 3 * np.sqrt(0.95 * 0.05 / count)

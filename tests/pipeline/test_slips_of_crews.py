@@ -23,7 +23,7 @@ OF_SLIPS = {
     "tape_correction_strange", "control_moved", "setup_set_aside", "lines_of_inside", "pasted_rows",
     "plates_too_short", "comparisons_apart", "tape_correction_mm_strange", "many_offsets_set_aside",
 }  # fmt: skip
-SOUND = draws(4, 30)
+SOUND = draws(2, 30)
 
 
 def computed(folder, book):

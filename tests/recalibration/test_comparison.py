@@ -234,7 +234,7 @@ def test_one_comparison_in_twenty_calls_an_unchanged_tank_another(c, figure):
     Truth: radii times the scale of each tape, volumes by rings; the zero, the temperature and the
     head of the former table are others, and declared.
     """
-    rng, count, tape = np.random.default_rng(7), draws(1500, 20_000), 1.5e-4
+    rng, count, tape = np.random.default_rng(7), draws(600, 20_000), 1.5e-4
     dips = np.round(np.arange(0.10, 8.395, 0.05), 3)
     common = np.sqrt(c) * tape * rng.normal(size=count)
     scales = common + np.sqrt(1 - c) * tape * rng.normal(size=(2, count))

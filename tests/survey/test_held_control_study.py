@@ -30,7 +30,7 @@ def said(measurements, name):
 @pytest.mark.parametrize(("error_m", "least"), [(0.02, 0.625), (0.05, 0.9), (0.2, 0.95)])
 def test_one_of_four_held_corners_is_wrong(error_m, least, figure):
     """Simulation: 20 networks (40 in full) of 3 mm distances, x of one corner wrong."""
-    networks = draws(20, 40)
+    networks = draws(10, 40)
     found = Counter(said(corners(error_m, seed), "x of B") for seed in range(networks))
     figure(f"a held corner {1e3 * error_m:.0f} mm off, of {networks}", dict(found))
     assert found["asked"] + found["named"] >= least * networks

@@ -166,7 +166,7 @@ NAMES = ("photographs", "total station")
 @pytest.mark.parametrize("name", NAMES)
 def test_intervals_cover_at_full_size(name, figure):
     """Standard error of a mean chi-square over its dof: that of 500 surveys, in full of 1000."""
-    done = study(name, draws(500, 1000))
+    done = study(name, draws(250, 1000))
     likely = told(figure, name, done)
     assert 0.935 < done.points < 0.965
     assert 0.935 < done.radii < 0.965
