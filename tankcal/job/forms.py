@@ -32,13 +32,23 @@ def filled_workbook(folder, log):
     by_text, by_book = _entries(text), _entries(sheets)
     if not _adds(by_book, by_text):
         return None
-    if not _adds(by_text, by_book):
+    of_text, of_book = _columns(by_text), _columns(by_book)
+    agree = all(by_text.get(place, value) == value for place, value in by_book.items()
+                if place[0] in KEYS)  # fmt: skip
+    if not _adds(by_text, by_book) or (agree and of_book > of_text):
         text = message(
             "workbook_is_read",
             "is read; the text files beside it are not filled in",
         )
         log.warning(WORKBOOK_FILE, text)
         return book
+    if agree and of_text > of_book:  # as of a plan, some of whose rows were then deleted
+        text = message(
+            "workbook_is_not_read",
+            "is not read, for it is less filled in than the text files beside it",
+        )
+        log.warning(WORKBOOK_FILE, text)
+        return None
     text = message(
         "both_forms_filled",
         "{settings} with its CSV files and {book} are both filled in, and differ; expected one "
@@ -53,6 +63,11 @@ def filled_workbook(folder, log):
 def _adds(entries, others):
     """Whether entries have a value that was typed, and that the other form does not have."""
     return any(others.get(place) != value for place, value in entries.items())
+
+
+def _columns(entries):
+    """{(section or table, key or heading)} that have a value."""
+    return {(place[0], place[-1]) for place in entries}
 
 
 def _entries(raw):

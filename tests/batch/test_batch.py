@@ -200,7 +200,7 @@ def test_a_survey_without_sound_solution(tmp_path, capsys, monkeypatch):
     [
         (ZeroDivisionError("division"), "batch_mistake"),
         (MemoryError(), "batch_no_memory"),
-        (OSError(errno.EIO, "Input/output error", "disk"), None),
+        (OSError(errno.EIO, "Input/output error", "disk"), "disk_error"),
     ],
 )
 def test_failures_are_tried_again(tmp_path, monkeypatch, capsys, error, code):
