@@ -27,6 +27,7 @@ from tankcal.record.making import record_of, record_of_adjustment
 TABLE, TABLE_TOLERANCE, TOLERANCE = "capacity.", 1e-9, 1e-6
 FACTORS, DRAWN, VOLUMES = "capacity.factor_m3[][]", "monte_carlo.", "_m3"
 ROUNDING, PROBES = 1e-14, 50  # of the largest volume; rows whose covariances with all are compared
+MOST_COPIED = 500_000_000  # bytes of an input file; tables and meshes are smaller
 UNCOMPARED = (
     "format", "tankcal", "versions", "job.source",  # who computed, and where
     "interpolation.at_m", "proportional_parts.zones[].at_m",  # of maxima, flat ones; these are
@@ -135,7 +136,7 @@ def compute_again(record, job, step=None, part=None, cluster="auto"):
 
 
 def _job_of(record, folder, temporary):
-    """Path of a job of the record's input files alone, links to those in `folder`.
+    """Path of a job of the record's input files alone, copies of those in `folder`.
 
     A job whose files lie elsewhere (clouds) is read where it is.
     """
@@ -146,8 +147,11 @@ def _job_of(record, folder, temporary):
     for name in names:
         place, source = temporary / name, (folder / name).resolve()
         place.parent.mkdir(parents=True, exist_ok=True)
+        if source.stat().st_size <= MOST_COPIED:  # a job follows no link to its tables
+            shutil.copyfile(source, place)
+            continue
         try:
-            os.symlink(source, place)
+            os.symlink(source, place)  # a cloud
         except OSError:  # where a system allows no links
             shutil.copyfile(source, place)
     books = [name for name in names if name.lower().endswith(".xlsx")]

@@ -131,6 +131,7 @@ def test_too_little_memory_is_told_in_a_line(tmp_path):
     folder = write_job(tmp_path / "job")
     ends = set()
     for limit_mb in (420, 450, 480, 1200):
+        shutil.rmtree(folder / "results", ignore_errors=True)
         done = subprocess.run(
             [sys.executable, "-m", "tankcal", "run", str(folder), "--quiet"],
             capture_output=True, text=True, timeout=200, check=False,
