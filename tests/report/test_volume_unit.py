@@ -3,9 +3,11 @@
 import json
 import re
 
+import openpyxl
 import pytest
 
 from tankcal.cli import main
+from tankcal.report import workbook
 from tankcal.report.paper import Paper
 from tankcal.report.tables.tank import CORRECTIONS
 from tankcal.report.uncertainty import budget
@@ -34,6 +36,23 @@ def test_no_table_of_a_report_in_litres_has_cubic_metres(example_record):
     units = [one["unit"] for block in found for one in block.data.get("columns", [])]
     assert "L" in units
     assert not [one for one in units if one in ("m³", "m³/unit")]
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("m3", 1.0), ("L", 1e3), ("bbl", 1 / 0.158987294928)])
+def test_the_first_sheet_has_volume_and_u_in_the_unit_of_the_job(
+    example_record, tmp_path, unit, factor
+):
+    record = paper_in(example_record, unit).record
+    workbook.write(record, tmp_path / "capacity.xlsx")
+    first = openpyxl.load_workbook(tmp_path / "capacity.xlsx").worksheets[0]
+    [(volume, U)] = [
+        (row[1], row[2]) for row in first.iter_rows() if str(row[2].number_format).startswith('"±')
+    ]
+    capacity, symbol = record["capacity"], {"m3": "m³"}.get(unit, unit)
+    assert volume.value == pytest.approx(factor * capacity["volume_m3"][-1], rel=1e-12)
+    assert U.value == pytest.approx(factor * capacity["U_m3"][-1], rel=1e-12)
+    assert volume.number_format.endswith(f'"{symbol}"')
+    assert U.number_format.endswith(f'"{symbol}"')
 
 
 @pytest.mark.slow

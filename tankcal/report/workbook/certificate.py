@@ -139,7 +139,7 @@ def _result(book, sheet, row, record):
     k = words["intervals"]["monte_carlo"] if k is None else k
     for column, value, shown in (
         (1, volume.factor * capacity["volume_m3"][-1], cubic),
-        (2, U, f'"± "{cubic}'),
+        (2, volume.factor * U, f'"± "{cubic}'),
         (3, k, '"k = "0.00'),
         (4, capacity["height_m"][-1], top),
     ):
