@@ -34,9 +34,13 @@ IN_A_PROCESS = """
 import sys
 from pathlib import Path
 from tankcal.report.pdf import _compile_in
-made = _compile_in(sys.argv[1], int(sys.argv[2]))
-Path(sys.argv[1], "made.part").write_bytes(made)
-Path(sys.argv[1], "made.part").rename(Path(sys.argv[1], "made.pdf"))
+from tankcal.errors import TankcalError
+folder = Path(sys.argv[1])
+try:
+    (folder / "made.part").write_bytes(_compile_in(folder, int(sys.argv[2])))
+    (folder / "made.part").rename(folder / "made.pdf")
+except TankcalError as error:
+    (folder / "refused.txt").write_text(str(error), encoding="utf-8")
 """
 FONT_FILES = ("STIXGeneral*.ttf", "DejaVuSerif*.ttf", "DejaVuSans.ttf")
 
@@ -83,10 +87,9 @@ def _set(files, attached, timestamp, packed):
 
 
 def _compile(files, timestamp):
-    """Set the page; the machine's own fonts are asked only for signs that the shipped ones lack.
+    """Set the page, in a process of its own where the system limits the memory.
 
-    Where tables and figures find no places that they all agree to, the figures no longer ask for
-    theirs, and where that is not enough nobody does.
+    A typesetter that gets no more memory ends its process.
     """
     return_freed_memory()  # of which nothing would serve the typesetter
     with TemporaryDirectory(prefix="tankcal-page-") as folder:
@@ -95,14 +98,13 @@ def _compile(files, timestamp):
             (Path(folder) / name).write_bytes(content)
         if not _is_memory_limited():
             return _compile_in(folder, timestamp)
-        # without memory the typesetter ends its process: it gets one of its own
         command = [sys.executable, "-c", IN_A_PROCESS, folder, str(timestamp)]
-        done = subprocess.run(command, capture_output=True, check=False)
-        made = Path(folder, "made.pdf")
+        subprocess.run(command, capture_output=True, check=False)
+        made, refused = Path(folder, "made.pdf"), Path(folder, "refused.txt")
         if made.is_file():
             return made.read_bytes()
-        if done.returncode == 1 and TankcalError.__name__.encode() in done.stderr:
-            raise TankcalError(done.stderr.decode(errors="replace").rpartition(": ")[2].strip())
+        if refused.is_file():
+            raise TankcalError(refused.read_text(encoding="utf-8"))
         raise MemoryError
 
 
@@ -116,7 +118,11 @@ def _is_memory_limited():
 
 
 def _compile_in(folder, timestamp):
-    """The PDF of main.typ in a folder. Raises TankcalError."""
+    """The PDF of main.typ in a folder; fonts of the machine serve only letters that ours lack.
+
+    Where tables and figures find no places that they all agree to, the figures no longer ask for
+    theirs, and where that is not enough no block does. Raises TankcalError.
+    """
     import typst
 
     def compiled(ignore_system_fonts, places=PLACES):
