@@ -18,45 +18,54 @@ OF_EVERY_FORM = (("tank", "kind"), ("table", "language"))  # every starter has t
 
 
 def filled_workbook(folder, log):
-    """The workbook of a folder with both forms if it alone is filled in, else None.
+    """The workbook of a folder with both forms if it is the one to read, else None.
 
-    Where both are filled in and differ, `log` gets one problem, for neither can be preferred.
+    The form with more entries is read where both agree otherwise. Two forms that contradict each
+    other are one problem in `log`.
     """
     book = folder / WORKBOOK_FILE
     if not ((folder / SETTINGS_FILE).is_file() and book.is_file()):
         return None
-    of_text, of_book = Log(), Log()
-    text, sheets = read_folder(folder, of_text), read_workbook(book, of_book)
-    if sheets is None or of_text.problems or text.settings is None:
+    log_of_texts = Log()
+    texts, sheets = read_folder(folder, log_of_texts), read_workbook(book, Log())
+    if sheets is None or log_of_texts.problems or texts.settings is None:
         return None  # the text files, with their problems
-    by_text, by_book = _entries(text), _entries(sheets)
-    if not _adds(by_book, by_text):
+    by_texts, by_book = _entries(texts), _entries(sheets)
+    if not _adds(by_book, by_texts):
         return None
-    of_text, of_book = _columns(by_text), _columns(by_book)
-    agree = all(by_text.get(place, value) == value for place, value in by_book.items()
-                if place[0] in KEYS)  # fmt: skip
-    if not _adds(by_text, by_book) or (agree and of_book > of_text):
-        text = message(
-            "workbook_is_read",
-            "is read; the text files beside it are not filled in",
+    if not _adds(by_texts, by_book):
+        expected = message(
+            "workbook_is_read", "is read; the text files beside it are not filled in"
         )
-        log.warning(WORKBOOK_FILE, text)
+        log.warning(WORKBOOK_FILE, expected)
         return book
-    if agree and of_text > of_book:  # as of a plan, some of whose rows were then deleted
-        text = message(
-            "workbook_is_not_read",
-            "is not read, for it is less filled in than the text files beside it",
+    # rows that a plan wrote may be deleted in one form alone: the form with more columns is read
+    agree = all(
+        by_texts.get(place, value) == value for place, value in by_book.items() if place[0] in KEYS
+    )
+    in_texts, in_book = _columns(by_texts), _columns(by_book)
+    if agree and in_book > in_texts:
+        expected = message(
+            "workbook_is_fuller",
+            "is read, because it is further filled in than the text files beside it",
         )
-        log.warning(WORKBOOK_FILE, text)
+        log.warning(WORKBOOK_FILE, expected)
+        return book
+    if agree and in_texts > in_book:
+        expected = message(
+            "workbook_is_not_read",
+            "is not read, because the text files beside it are further filled in",
+        )
+        log.warning(WORKBOOK_FILE, expected)
         return None
-    text = message(
+    expected = message(
         "both_forms_filled",
         "{settings} with its CSV files and {book} are both filled in, and differ; expected one "
         "form: move the other one away",
         settings=SETTINGS_FILE,
         book=WORKBOOK_FILE,
     )
-    log.problem(folder.resolve().name, text)
+    log.problem(folder.resolve().name, expected)
     return None
 
 

@@ -106,7 +106,16 @@ def rename_headings(table, fields, log):
         )
         log.warning(table.file, text, table.heading_row)
     for heading, one in meanings.items():
-        if one.factor != 1:
+        if one.factor is None:
+            text = message(
+                "heading_in_unknown_unit",
+                "is {column} in {unit}, a unit that is not converted; expected the unit of "
+                "{column}",
+                column=one.column,
+                unit=one.unit,
+            )
+            log.problem(table.file, text, table.heading_row, heading)
+        elif one.factor != 1:
             text = message(
                 "heading_in_other_unit",
                 "is {column} in {unit}; expected its own unit: tankcal import {file} --replace "

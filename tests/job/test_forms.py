@@ -39,8 +39,8 @@ def both(tmp_path):
     return tmp_path / "job"
 
 
-def fill_book(path):
-    tables = job_parts().tables
+def fill_book(path, tables=None):
+    tables = tables or job_parts().tables
     wanted = {name: [field.name for field in COLUMNS[name]] for name in tables}
     rows = {
         name: [
@@ -52,7 +52,7 @@ def fill_book(path):
     fill_form(path, {key: SETTINGS[key] for key in BLANKS}, rows)
 
 
-def fill_texts(folder):
+def fill_texts(folder, tables=None):
     parts = job_parts()
     settings = folder / "job.toml"
     text = settings.read_text(encoding="utf-8")
@@ -61,7 +61,7 @@ def fill_texts(folder):
         typed = f'"{value}"' if isinstance(value, str) else repr(value)
         text = text.replace(f'\n{name} = ""', f"\n{name} = {typed}", 1)
     settings.write_text(text, encoding="utf-8")
-    for name, rows in parts.tables.items():
+    for name, rows in (tables or parts.tables).items():
         width = len(COLUMNS[name])
         with open(folder / f"{name}.csv", "a", encoding="utf-8") as file:
             for row in rows[1:]:
@@ -97,6 +97,22 @@ def test_two_filled_forms_that_differ_are_one_problem(both):
     [problem] = problems_of(both)
     assert "are both filled in, and differ" in str(problem)
     assert tankcal.load(both / "job.xlsx").tank.id == "T-1"  # named by the user: no doubt
+
+
+@pytest.mark.parametrize(("fuller", "said"), [
+    ("texts", "is not read, because the text files beside it are further filled in"),
+    ("book", "is read, because it is further filled in than the text files beside it"),
+])  # fmt: skip
+def test_of_two_forms_that_agree_the_fuller_one_is_read(both, fuller, said):
+    """As after a plan: the other form has names without values, and a row that was deleted here."""
+    whole, names = job_parts().tables, job_parts().tables
+    names["points"] = [names["points"][0], *([row[0]] for row in names["points"][1:])]
+    whole["points"] = [whole["points"][0], *whole["points"][2:]]
+    fill_texts(both, whole if fuller == "texts" else names)
+    fill_book(both / "job.xlsx", whole if fuller == "book" else names)
+    job = tankcal.load(both)
+    assert len(job.points.names) == 119
+    assert [str(one) for one in job.warnings] == [f"job.xlsx: {said}"]
 
 
 def test_two_forms_of_the_same_content_are_read_as_text(both):

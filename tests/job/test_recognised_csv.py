@@ -119,3 +119,16 @@ def test_one_number_that_shows_its_mark_decides_for_the_file(tmp_path):
 )  # fmt: skip
 def test_numbers_with_two_meanings(text, expected):
     assert has_two_meanings(text) is expected
+
+
+@pytest.mark.parametrize(("heading", "said"), [
+    ("Altura (mm)", "is z_m in mm; expected its own unit: tankcal import points.csv --replace"),
+    ("Altura (kg)", "is z_m in kg, a unit that is not converted; expected the unit of z_m"),
+])  # fmt: skip
+def test_a_heading_in_another_unit_is_refused_with_its_remedy(tmp_path, heading, said):
+    folder = write_folder(tmp_path / "job", job_parts())
+    points = folder / "points.csv"
+    points.write_text(points.read_text(encoding="utf-8").replace("z_m", heading, 1), "utf-8")
+    with pytest.raises(InputError) as refused:
+        load(folder)
+    assert any(said in str(one) for one in refused.value.problems)
