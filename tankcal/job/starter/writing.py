@@ -1,6 +1,5 @@
 """Where a starter job goes: a new folder, or one workbook that did not exist."""
 
-import csv
 import dataclasses
 import io
 import json
@@ -16,6 +15,7 @@ from tankcal.job.starter.texts import is_number, texts_in
 from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE
 from tankcal.messages import message
 from tankcal.text.languages import DEFAULT
+from tankcal.text.spreadsheets import write_guarded
 from tankcal.text.words import say
 
 KEPT = ("field-sheets.pdf",)  # may lie in the folder when its form is written again
@@ -136,14 +136,17 @@ def csv_text(table, form):
     if table == "uncertainty":
         lines += [_input(texts, name, one) for name, one in form.inputs.items()]
     separator, decimal = (form.start("csv", field) for field in CSV)
-    text = io.StringIO()
-    writer = csv.writer(text, delimiter=separator, lineterminator="\n")
-    writer.writerow(field.name for field in fields)
+    rows = [[field.name for field in fields]]
     for row in form.rows(table):
         cells = [(field, row.get(field.name, "")) for field in fields]
-        writer.writerow(
-            cell.replace(".", decimal) if field.kind == "number" else cell for field, cell in cells
+        rows.append(
+            [
+                cell.replace(".", decimal) if field.kind == "number" else cell
+                for field, cell in cells
+            ]
         )
+    text = io.StringIO()
+    write_guarded(text, rows, separator)
     return "\n".join(lines) + "\n" + text.getvalue()
 
 
