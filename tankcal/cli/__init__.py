@@ -95,9 +95,9 @@ def main(arguments=None):
 
 
 def _status_of(error):
-    """Exit status of a command that was ended, or failed by its machine, after a line about it.
+    """Exit status of a command that a signal, the memory or the disk ended; prints one line.
 
-    Raises everything else again.
+    Raises any other error again.
     """
     status = stopped_status(error)
     if status is not None:

@@ -8,7 +8,7 @@ from tankcal.cli.arguments import add_language, positive, refuse_argument
 from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.showing import prepare_for_small_work, say, speak, warn
 from tankcal.errors import InputError, Problem, problem_of
-from tankcal.job.tables import WORKBOOK_FILE
+from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE
 from tankcal.messages import message, printable
 
 LISTS = (".csv", ".txt", ".tsv")
@@ -120,7 +120,7 @@ def _asked_of_folder(folder):
     """The language of the job that the tables go to; None: there is none yet."""
     from tankcal.cli.asked_language import asked_language
 
-    return asked_language(folder) if (folder / "job.toml").is_file() else None
+    return asked_language(folder) if (folder / SETTINGS_FILE).is_file() else None
 
 
 def _import(options):
@@ -171,7 +171,7 @@ def _import(options):
 
 def _folder_here():
     """The folder of the command when it is a job."""
-    if Path("job.toml").is_file():
+    if Path(SETTINGS_FILE).is_file():
         return "."
     raise refuse_argument(
         message("import_without_out", "expected --out DIR, the folder of the job")
@@ -213,8 +213,9 @@ def _list_of(options):
         if is_named:
             raise
         return None  # the reader of field books refuses it
-    names = {one.name for one in found.missing} - {"point"}
-    is_list = len(names) < sum(field.required for field in lists.COLUMNS[name]) - 1
+    # at least one needed column beside the name of the point is recognised
+    unknown = {one.name for one in found.missing} - {"point"}
+    is_list = len(unknown) < sum(field.required for field in lists.COLUMNS[name]) - 1
     return found if is_named or is_list else None
 
 

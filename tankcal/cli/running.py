@@ -113,7 +113,7 @@ def _demo(options):
 
 
 def _print_doubts_of_job(job, show, tell):
-    """The implausible inputs, before the time is spent that computing with them takes."""
+    """Print the implausible inputs before computing, which may take long with them."""
     doubts = _doubts_among(job.warnings)
     if doubts and tell is _tell:
         show.end()
@@ -127,7 +127,7 @@ def _doubts_among(warnings):
 
 
 def _tell(out, paths, warnings, result, adjustment):
-    """Warnings, a summary and the files, for a person; implausible inputs once more at the end."""
+    """Print warnings, a summary and the files; implausible inputs once more at the end."""
     doubts = _doubts_among(warnings)
     warn(one for one in warnings if one not in doubts)
     if adjustment is not None:

@@ -4,6 +4,7 @@ import signal
 import threading
 from contextlib import contextmanager
 
+_OF_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread")
 ENDING = ("SIGTERM", "SIGHUP")  # beside SIGINT, which Python turns into KeyboardInterrupt
 
 
@@ -48,13 +49,10 @@ def stopped_status(error):
     return None if error is None else 128 + getattr(error, "number", signal.SIGINT)
 
 
-_OF_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread")
-
-
 def is_of_memory(error):
     """Whether a command failed because the system gave it no more memory.
 
-    A library that cannot be loaded, or a thread that cannot be started, is told as another error.
+    Python raises other errors for a library that cannot be loaded and a thread that cannot start.
     """
     if isinstance(error, ImportError | RuntimeError | OSError):
         return any(one in str(error).lower() for one in _OF_MEMORY)

@@ -277,11 +277,11 @@ def read_bytes(path, log, limit=MAX_FILE_BYTES):
 def read_beside(folder, name, log, limit=MAX_FILE_BYTES):
     """The bytes of a file of a job, or None after telling `log`; no link leads out of its folder.
 
-    A job may come from somebody else: what a link points to is no part of it, and lines of it
-    would be printed where they are no table.
+    A job may come from somebody else. The target of such a link is no part of the job, and a
+    message about a table that cannot be read would print lines of it.
     """
     path = folder / name
-    with suppress(OSError, ValueError, RuntimeError):  # read_bytes tells of these
+    with suppress(OSError, ValueError, RuntimeError):  # read_bytes reports these
         if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
             expected = message(
                 "link_out_of_job",

@@ -1,7 +1,7 @@
-"""Texts of others in CSV files, which a spreadsheet must not execute as formulas.
+"""Texts in CSV files that a spreadsheet would execute as formulas.
 
-An apostrophe before the sign makes a spreadsheet show the text. Tables of a job are read with it
-removed, so that a name is the same after it was written and read.
+With an apostrophe before its sign a spreadsheet shows such a text. A table of a job is read without
+the apostrophe, so that a text is the same after it was written and read.
 """
 
 import csv
@@ -21,7 +21,7 @@ def guard_formula(text):
     >>> guard_formula("=1+1"), guard_formula("-0.25"), guard_formula("P-1")
     ("'=1+1", '-0.25', 'P-1')
     """
-    text = text.replace("\r", " ")  # csv does not quote it, and a line of its own would follow
+    text = text.replace("\r", " ")  # csv.writer does not quote it, so that a new row would begin
     if not text.lstrip(" ").startswith(_SIGNS) or NUMBER.fullmatch(text.replace(",", ".")):
         return text
     return f"'{text}" if any(map(str.isalnum, text)) else text

@@ -68,8 +68,8 @@ def serve_app(notebook, port, address=HERE, is_browser=True, token=""):
     ]
     headers = {"Content-Security-Policy": POLICY}
     left = {"cull_idle_timeout": LEFT_S, "cull_interval": LOOK_S, "cull_connected": False}
-    # On an address of this machine alone there is no token. A page of another host whose name is
-    # made to point here must not get in: only "localhost" and 127.0.0.1 are answered there.
+    # On an address of this machine alone there is no token. A web page whose host name resolves to
+    # this machine (DNS rebinding) must not reach the kernel: other host names are refused.
     tornado = {"headers": headers, "allow_remote_access": not is_local(address)}
     settings = Config({"Voila": {"tornado_settings": tornado}, "MappingKernelManager": left})
     Voila.launch_instance(given, config=settings)

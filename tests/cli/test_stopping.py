@@ -2,7 +2,6 @@
 
 import json
 import os
-import resource
 import shutil
 import signal
 import subprocess
@@ -129,6 +128,8 @@ def test_runs_that_are_ended_lose_nothing_study(job):
 def test_too_little_memory_is_told_in_a_line(tmp_path):
     """At every limit either the whole results or one line; what the typesetter needs is one too."""
     folder = write_job(tmp_path / "job")
+    import resource
+
     ends = set()
     for limit_mb in (420, 450, 480, 1200):
         shutil.rmtree(folder / "results", ignore_errors=True)

@@ -53,9 +53,9 @@ def simulate(model, inputs, correlation=None, *, goal=None, sensitivities=None, 
         For what cannot be a correlation or has other shapes.
     """
     goal = goal or Goal()
-    progress = progress or (lambda text, done, total: None)
     if isinstance(model, QuadraticRows):
         return simulate_quadratic(model, inputs, correlation, goal=goal, progress=progress)[0]
+    progress = progress or (lambda text, done, total: None)
     ready = inputs_of(inputs, correlation)
     control = None
     if ready.transform is not None:
@@ -64,14 +64,15 @@ def simulate(model, inputs, correlation=None, *, goal=None, sensitivities=None, 
     return simulation(goal, *simulate_in_batches(model, ready, control, goal, progress))
 
 
-def simulate_quadratic(rows, inputs, correlation=None, *, goal, progress, choose=None):
+def simulate_quadratic(rows, inputs, correlation=None, *, goal, progress=None, choose=None):
     """The `Simulation` of quadratic rows, and the places of its rows among them.
 
-    choose  choose(places) -> those of the rows at these places that plain draws are spent on, a
-            second each: few points do not determine their intervals. All by default; the rows
-            that are not chosen are left out
+    choose  choose(places) -> some of these places: the rows there need plain draws, a second each,
+            because few points do not determine their intervals. By default all are drawn for;
+            rows that are not chosen are left out
     Raises ValueError as `simulate`.
     """
+    progress = progress or (lambda text, done, total: None)
     ready = inputs_of(inputs, correlation)
     if rows.jacobian.shape[1] != len(ready.mean):
         raise ValueError(f"{len(ready.mean)} inputs, {rows.jacobian.shape[1]} columns of the model")

@@ -76,8 +76,8 @@ def _distribution(source):
 UNFELT = 1e-4  # of u of a volume: an input that adds less is not drawn for it
 COUNTED = ("reached", "controlled", "draws", "tolerance")  # of a row that was drawn for
 
-# rows that are drawn for, in all, of bent ones, and of those that take plain draws; of longer
-# tables the others follow their neighbours
+# How many rows are simulated: in all, of bent ones, and of those that need plain draws. The other
+# rows of a longer table are interpolated between them.
 MOST_ROWS, MOST_BENT, MOST_PLAIN = 800, 60, 16
 
 
@@ -109,7 +109,7 @@ class Model:
             self.quadratic.subset(even),
             self.inputs.distributions,
             goal=goal,
-            progress=progress or (lambda text, done, total: None),
+            progress=progress,
             choose=lambda hard: np.searchsorted(even, self._thinned(even[hard], MOST_PLAIN)),
         )
         even = even[kept]
