@@ -122,8 +122,8 @@ def _result(book, sheet, row, record):
     """The capacity at the top of the table with U and k on its line; returns the next row."""
     capacity, words = record["capacity"], book.words
     U, k = stated_U_m3(capacity)[-1], k_of_rows(capacity)[-1]
-    volume = unit(record["job"]["table"]["volume_unit"])
-    cubic = number_format(decimals_of(volume.factor * U), unit=volume.symbol)
+    factor, symbol = book.paper.volume_factor, book.paper.volume_symbol
+    of_volume = number_format(decimals_of(factor * U), unit=symbol)
     top = number_format(decimals_of_height(capacity["height_m"][-1]), unit="m")
     book.heading(sheet, row, sentence(words, "headings", "result"), len(_WIDTHS))
     lines = []
@@ -138,8 +138,8 @@ def _result(book, sheet, row, record):
     book.put(sheet, row + 2, 0, book.word("labels.top_of_table"), **line)
     k = words["intervals"]["monte_carlo"] if k is None else k
     for column, value, shown in (
-        (1, volume.factor * capacity["volume_m3"][-1], cubic),
-        (2, volume.factor * U, f'"± "{cubic}'),
+        (1, factor * capacity["volume_m3"][-1], of_volume),
+        (2, factor * U, f'"± "{of_volume}'),
         (3, k, '"k = "0.00'),
         (4, capacity["height_m"][-1], top),
     ):
@@ -164,11 +164,13 @@ def _corrections(book, sheet, row, record):
     words = book.words
     book.heading(sheet, row, sentence(words, "headings", "corrections"), len(_WIDTHS))
     applied = [correction for correction in record["corrections"] if correction["applied"]]
-    cubic = number_format(decimals_of(stated_U_m3(record["capacity"])[-1]) + 1, unit="m³")
+    factor, symbol = book.paper.volume_factor, book.paper.volume_symbol
+    decimals = decimals_of(factor * stated_U_m3(record["capacity"])[-1]) + 1
+    of_volume = number_format(decimals, unit=symbol)
     for correction in applied:
         row += 1
         book.put(sheet, row, 0, sentence(words, "corrections", correction["code"]))
-        book.put(sheet, row, 1, correction["size_m3"], num_format=cubic)
+        book.put(sheet, row, 1, factor * correction["size_m3"], num_format=of_volume)
         book.put(sheet, row, 2, correction["size_percent"], num_format='0.0000 "%"')
     if not applied:
         row += 1
