@@ -4,6 +4,7 @@ import re
 
 from tankcal.fieldbooks import gsi, jobxml, profile, rw5, sdr
 from tankcal.fieldbooks.cutting import tell_cut_numbers
+from tankcal.job.folder import has_too_many_lines
 from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.text.decoding import decode_text, find_encoding
@@ -16,7 +17,7 @@ NAMES = {
     "sdr": "Sokkia SDR",
     "csv": "CSV",
 }
-MAX_BYTES, MAX_LINE, LOOKED_AT = 50_000_000, 4000, 60  # of a file, characters, lines
+MAX_BYTES, MAX_LINES, MAX_LINE, LOOKED_AT = 50_000_000, 100_000, 4000, 60  # of a file, characters
 _JOBXML = re.compile(r"<(\w+:)?JOBFile[\s>]")
 # A serial transfer puts controls (STX, ETX, Ctrl-Z, zero bytes) around lines, and controls of its
 # flow (XON, XOFF) anywhere.
@@ -40,7 +41,7 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
     custom     gsi.Custom: what code blocks of GSI mean
     """
     text = _text(file, data, log)
-    if text is None:
+    if text is None or has_too_many_lines(file, text, log, MAX_LINES):
         return None
     found = wanted or _format_of(text, described)
     if found is None:

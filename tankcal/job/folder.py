@@ -8,6 +8,7 @@ from tankcal.errors import reason_of
 from tankcal.job.tables import (
     COVARIANCE_FILE,
     MAX_FILE_BYTES,
+    MAX_LINES,
     MAX_PROBLEMS_PER_FILE,
     NOT_KNOWN,
     RADII_COVARIANCE_FILE,
@@ -429,7 +430,7 @@ def read_csv(file, data, separator, decimal, log, settings_file=SETTINGS_FILE):
     decimal    as it is declared; NOT_KNOWN: it is not
     """
     text = decode(file, data, log, or_western=True)
-    if text is None:
+    if text is None or has_too_many_lines(file, text, log):
         return None
     separator = separator_of_text(text, separator)
     hint = ""
@@ -442,6 +443,20 @@ def read_csv(file, data, separator, decimal, log, settings_file=SETTINGS_FILE):
     if separator == "," and decimal == NOT_KNOWN:
         decimal = "."  # a decimal comma would have divided the number
     return make_table(file, _csv_rows(file, text, separator, log), decimal, log, hint)
+
+
+def has_too_many_lines(file, text, log, most=MAX_LINES):
+    """Whether a text has more lines than a table may have, after telling `log` so.
+
+    Asked before anything is made of the lines.
+    """
+    count = max(text.count("\n"), text.count("\r")) + (not text.endswith(("\n", "\r")))
+    if count > most:
+        expected = message(
+            "too_many_lines", "{count} lines; expected at most {most}", count=count, most=most
+        )
+        log.problem(file, expected)
+    return count > most
 
 
 def separator_of_text(text, usual):

@@ -53,6 +53,7 @@ COVARIANCE_FILE = "points_cov.npz"
 RADII_COVARIANCE_FILE = "radii_cov.npz"
 
 MAX_FILE_BYTES = 200_000_000
+MAX_LINES, MAX_COLUMNS = 500_000, 100  # of a text table
 MAX_PROBLEMS_PER_FILE = 50
 SEPARATORS = (",", ";", "\t")
 NOT_KNOWN = "?"  # in place of the decimal mark of a CSV file
@@ -361,6 +362,9 @@ def make_table(file, numbered_rows, decimal, log, hint=""):
 
 
 def _headings(file, cells, number, log):
+    if len(cells) > MAX_COLUMNS:
+        log.problem(file, too_many_columns(len(cells)), number)
+        return None
     sound = True
     for position, cell in enumerate(cells):
         if not isinstance(cell, str) or not cell:
@@ -381,6 +385,13 @@ def _headings(file, cells, number, log):
             )
             sound = False
     return tuple(cells) if sound else None
+
+
+def too_many_columns(count):
+    """What is said of a row of so many cells."""
+    return message(
+        "too_many_columns", "{count} cells; expected at most {most}", count=count, most=MAX_COLUMNS
+    )
 
 
 def missing_sheet():

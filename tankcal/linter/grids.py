@@ -5,17 +5,17 @@ import json
 import re
 from dataclasses import dataclass
 
-from tankcal.job.excel import MAX_COLUMNS, Unreadable, read_sheets
-from tankcal.job.folder import decode
+from tankcal.job.excel import Unreadable, read_sheets
+from tankcal.job.folder import decode, has_too_many_lines
 from tankcal.job.sheets import is_read
-from tankcal.job.tables import read_bytes, shown
+from tankcal.job.tables import MAX_COLUMNS, read_bytes, shown, too_many_columns
 from tankcal.linter.pdf_grids import tables_of_text
 from tankcal.linter.pdf_text import pages_of
 from tankcal.messages import message
 from tankcal.record import FORMAT, version_of
 from tankcal.text.delimited import find_separator
 
-MOST_COLUMNS, MOST_LINES = MAX_COLUMNS, 200_000
+MOST_LINES = 100_000
 
 
 @dataclass(frozen=True)
@@ -130,6 +130,8 @@ def _record(file, text, log):
 
 
 def _csv(file, text, log):
+    if has_too_many_lines(file, text, log, MOST_LINES):
+        return ()
     lines = [
         (number, line)
         for number, line in enumerate(re.split("\r\n|\r|\n", text), 1)
@@ -137,17 +139,6 @@ def _csv(file, text, log):
     ]
     if not lines:
         log.problem(file, message("lint_empty", "empty; expected a table of heights and volumes"))
-        return ()
-    if len(lines) > MOST_LINES:
-        log.problem(
-            file,
-            message(
-                "lint_too_many_lines",
-                "{count} lines; expected at most {most}",
-                count=len(lines),
-                most=MOST_LINES,
-            ),
-        )
         return ()
     separator = find_separator([line for _, line in lines])
     rows = []
@@ -165,17 +156,8 @@ def _csv(file, text, log):
                 number,
             )
             continue
-        if len(cells) > MOST_COLUMNS:
-            log.problem(
-                file,
-                message(
-                    "lint_too_many_cells",
-                    "{count} cells; expected at most {most}",
-                    count=len(cells),
-                    most=MOST_COLUMNS,
-                ),
-                number,
-            )
+        if len(cells) > MAX_COLUMNS:
+            log.problem(file, too_many_columns(len(cells)), number)
         elif any(cell.strip() for cell in cells):
             rows.append((number, tuple(cells)))
     return (Grid(file, tuple(rows), True),)

@@ -10,8 +10,9 @@ import sys
 
 from tankcal.messages import message
 
-MOST_PAGES, MOST_TEXT = 300, 20_000_000
-MOST_SECONDS = 300
+MOST_PAGES = 300
+MOST_CONTENT = 2_500_000  # bytes that draw the pages; it takes some ten seconds to lay out as many
+MOST_SECONDS = 60
 MEMORY_LIMIT = 2 << 30  # bytes of address space
 PAGES, ENCRYPTED, MANY_PAGES, LONG_TEXT, DAMAGED = "pages", "encrypted", "many", "long", "damaged"
 _CODE = (
@@ -46,7 +47,12 @@ def _refusal(kind, said):
             most=MOST_PAGES,
         )
     if kind == LONG_TEXT:
-        return message("lint_much_text", "more text than a table can have; expected a table")
+        return message(
+            "lint_much_text",
+            "more than {most:.1f} MB of text and drawings on its pages; expected only the pages of "
+            "the table",
+            most=MOST_CONTENT / 1e6,
+        )
     return message("lint_damaged_pdf", "not a PDF that can be read, or damaged")
 
 
@@ -90,10 +96,17 @@ def _answer(path):
         return [ENCRYPTED, None]
     if len(reader.pages) > MOST_PAGES:
         return [MANY_PAGES, len(reader.pages)]
-    pages, size = [], 0
-    for page in reader.pages:
-        pages.append(page.extract_text(extraction_mode="layout"))
-        size += len(pages[-1])
-        if size > MOST_TEXT:
-            return [LONG_TEXT, None]
-    return [PAGES, pages]
+    if not _is_short(reader.pages):
+        return [LONG_TEXT, None]
+    return [PAGES, [page.extract_text(extraction_mode="layout") for page in reader.pages]]
+
+
+def _is_short(pages):
+    """Whether the pages draw at most MOST_CONTENT: told before any of them is laid out."""
+    size = 0
+    for page in pages:
+        content = page.get_contents()
+        size += len(content.get_data()) if content is not None else 0
+        if size > MOST_CONTENT:
+            return False
+    return True

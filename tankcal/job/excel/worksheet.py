@@ -7,10 +7,9 @@ from functools import cache
 from tankcal.job.excel.archive import Unreadable, damaged
 from tankcal.job.excel.markup import parse
 from tankcal.job.excel.values import uncalculated
-from tankcal.job.tables import shown
+from tankcal.job.tables import MAX_COLUMNS, shown
 from tankcal.messages import message
 
-MAX_COLUMNS = 100
 MAX_ROWS = 100_000  # that are not blank
 LAST_ROW = 1_048_576  # of Excel itself
 _RANGE = re.compile(r"([A-Z]{1,3})([0-9]{1,7})(?::([A-Z]{1,3})([0-9]{1,7}))?")
