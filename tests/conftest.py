@@ -7,6 +7,7 @@ import shutil
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from zlib import crc32
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: two workers share two cores
 
@@ -130,6 +131,10 @@ def figure(record_property):
     return lambda what, value: record_property("figure", f"{what}: {value}")
 
 
+def pytest_addoption(parser):
+    parser.addoption("--part", metavar="K/N", help="of the studies only part K of N, by their names")
+
+
 def pytest_configure(config):
     """The quick tests never wait for a compiler; the others do where there is enough to compute."""
     gc.disable()  # until all is collected
@@ -144,10 +149,11 @@ def pytest_collection_finish():
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
     """A test that asks for one of its module's `SLOW_FIXTURES` is slow as well.
 
-    Of a test that is `slow(after=n)`, the first n cases are not: `make test` runs them.
+    Of a test that is `slow(after=n)`, the first n cases are not: `make test` runs them. Of the
+    studies those of another `--part` are left out.
     """
     seen = Counter()
     for item in items:
@@ -159,6 +165,16 @@ def pytest_collection_modifyitems(items):
             seen[case] += 1
             if seen[case] <= mark.kwargs["after"]:
                 item.own_markers.remove(mark)
+    if config.option.part:
+        part, of = map(int, config.option.part.split("/"))
+        others = [
+            item
+            for item in items
+            if item.get_closest_marker("study")
+            and crc32(f"{item.path.name}::{item.originalname}".encode()) % of != part % of
+        ]
+        config.hook.pytest_deselected(items=others)
+        items[:] = [item for item in items if item not in set(others)]
 
 
 def pytest_terminal_summary(terminalreporter):
