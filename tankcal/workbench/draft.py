@@ -27,7 +27,7 @@ from tankcal.job.tables import (
     read_bytes,
 )
 from tankcal.messages import message
-from tankcal.text.decoding import decode_text, find_encoding
+from tankcal.text.decoding import WESTERN, decode_text, find_encoding, is_western
 from tankcal.workbench.book import new_sheet_table, read_book, written_book
 from tankcal.workbench.findings import Check, found_in
 from tankcal.workbench.keys import NOT_HERE, SETTINGS, EditedKeys
@@ -134,8 +134,8 @@ class Draft:
             file = f"{name}.csv"
             if (self.source / file).is_file():
                 data = self._content(file)
-                if data is not None and decode(file, data, Log()) is not None:
-                    text = data.decode(find_encoding(data))  # a byte order mark is kept
+                text = None if data is None else _edited_text(file, data)
+                if text is not None:
                     self.tables[name] = read_csv_table(name, file, text, *marks)
 
     def _add_keys(self, name, file, data):
@@ -389,6 +389,17 @@ class Draft:
                 changed.append(Problem(name, expected))
         if changed:
             raise InputError(changed)
+
+
+def _edited_text(file, data):
+    """The text of a CSV file with its byte order mark, or None where it cannot be read.
+
+    An edited file is written in UTF-8. One in Windows-1252 gets the mark, by which Excel
+    recognises UTF-8.
+    """
+    if is_western(data):
+        return f"\ufeff{data.decode(WESTERN)}"
+    return data.decode(find_encoding(data)) if decode(file, data, Log()) is not None else None
 
 
 def _digest(data):

@@ -119,6 +119,19 @@ def test_separator_and_decimal_of_the_job_stay(tmp_path):
         draft.set_value("job", "csv", "decimal", ".")
 
 
+@pytest.mark.parametrize("encoding", ["cp1252", "utf-16", "utf-8-sig"])
+def test_an_edited_table_is_saved_in_utf_8_with_its_letters(folder, encoding):
+    path = folder / "points.csv"
+    text = "# medição\n" + path.read_text()
+    path.write_bytes(text.encode(encoding))
+    draft = Draft.open(folder)
+    first = draft.tables["points"].rows[0].cells[0]
+    draft.set_cells("points", [(0, "point", "A-ção")])
+    draft.save()
+    expected = text.replace(f"\n{first},", "\nA-ção,", 1)
+    assert path.read_bytes() == expected.encode("utf-8-sig")
+
+
 def test_nothing_is_written_over_the_work_of_another(folder):
     draft = Draft.open(folder)
     draft.set_cells("courses", [(0, "height_m", "1.8")])
