@@ -132,7 +132,7 @@ def figure(record_property):
 
 
 def pytest_addoption(parser):
-    parser.addoption("--part", metavar="K/N", help="of the studies only part K of N, by their names")
+    parser.addoption("--part", metavar="K/N", help="of slow tests and studies only part K of N, by their names")
 
 
 def pytest_configure(config):
@@ -152,8 +152,8 @@ def pytest_collection_finish():
 def pytest_collection_modifyitems(config, items):
     """A test that asks for one of its module's `SLOW_FIXTURES` is slow as well.
 
-    Of a test that is `slow(after=n)`, the first n cases are not: `make test` runs them. Of the
-    studies those of another `--part` are left out.
+    Of a test that is `slow(after=n)`, the first n cases are not: `make test` runs them. Slow tests
+    and studies of another `--part` are left out.
     """
     seen = Counter()
     for item in items:
@@ -170,7 +170,7 @@ def pytest_collection_modifyitems(config, items):
         others = [
             item
             for item in items
-            if item.get_closest_marker("study")
+            if (item.get_closest_marker("slow") or item.get_closest_marker("study"))
             and crc32(f"{item.path.name}::{item.originalname}".encode()) % of != part % of
         ]
         config.hook.pytest_deselected(items=others)
