@@ -276,9 +276,10 @@ def test_the_study_of_spoilt_tables(tmp_path, figure):
     show(figure, counts, f"linter, {tables} spoilt tables")
     for spoil in SPOILING:
         total, seen, named, _ = counts[spoil]
-        if spoil is not missing_last_row:
-            assert seen >= 0.93 * total
-            assert named >= 0.93 * total
+        if spoil is not missing_last_row:  # of 16 tables, as in CI, the share has an sd of 0.06
+            least = 0.93 * total - draws(2, 0) * np.sqrt(0.93 * 0.07 * total)
+            assert seen >= least
+            assert named >= least
 
 
 @pytest.mark.slow
