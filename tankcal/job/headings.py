@@ -30,6 +30,12 @@ USUAL = {  # by the name of a column without its unit
     "height": ("height", "altura"),
     "reading": ("reading", "leitura", "lectura"),
 }
+STANDARD_DEVIATIONS = (
+    *("s", "sd", "std", "std dev", "standard deviation", "sigma", "u", "uncertainty"),
+    *("dp", "desvio", "desvio padrao", "incerteza"),
+    *("desv", "desviacion", "desviacion estandar", "desviacion tipica", "incertidumbre"),
+)
+USUAL |= {f"s{axis}": tuple(f"{name} {axis}" for name in STANDARD_DEVIATIONS) for axis in "xyz"}
 LENGTHS = {  # sizes in metres
     "m": Fraction(1),
     "dm": Fraction(1, 10),

@@ -172,6 +172,10 @@ def test_a_heading_in_another_unit_is_refused(job):
         ("wall_hits", "Direction (deg)", "direction_deg"),
         ("wall_hits", "Dirección", None),  # in which unit?
         ("points", "X_M", "x_m"),
+        ("points", "Desvio padrão x (mm)", "sx_mm"),
+        ("points", "Desviación estándar Z (mm)", "sz_mm"),
+        ("points", "Std dev y (mm)", "sy_mm"),
+        ("points", "Desvio (mm)", None),  # of which coordinate?
         ("points", "Diâmetro", None),
     ],
 )
