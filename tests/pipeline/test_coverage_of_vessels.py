@@ -163,7 +163,8 @@ def test_intervals_hold_on_rings_of_vessels_study(base_job, figure, shares):  # 
     found = [errors_of_ring(seed, base_job, shares) for seed in range(count)]
     held, wide = judge(found, f"welded rings, {len(shares)} straps", figure)
     assert held > least(count)
-    assert wide < MOST_WIDE_OF_RINGS
+    # the ratio of 12 tanks is known to 20 %
+    assert wide < MOST_WIDE_OF_RINGS * (1 + draws(3, 0) / np.sqrt(2 * count))
 
 
 @pytest.mark.study
