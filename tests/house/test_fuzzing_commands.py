@@ -14,7 +14,14 @@ from zlib import crc32
 
 import numpy as np
 import pytest
-from called_commands import call, list_accepted_falls, list_faults, make_bases, numbers_of
+from called_commands import (
+    call,
+    call_valid,
+    list_accepted_falls,
+    list_faults,
+    make_bases,
+    numbers_of,
+)
 from draws import draws
 from fuzzing import NEUTRAL, add_odd_file, spoilt_folder
 
@@ -23,7 +30,10 @@ pytestmark = pytest.mark.slow
 DEAR = (  # a valid input takes a second or more
     "read-table", "report", "plan", "influence", "run liquid", "run ship", "run cloud", "photos",
 )  # fmt: skip
-ODD_PLACES = ("in place", "é ü", "a'b", "$(x)", "日本", "\u202eb", "[x]", "a;b", "%s{x}", "#1", "~")
+ODD_PLACES = (
+    "in place", "é ü", "a'b", "$(x)", "日本", "\u202eb", "[x]", "a;b", "%s{x}", "#1", "~", "\udcff",
+    "a\nb", "\x1b[2J", "results",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -102,14 +112,14 @@ def change_neutrally(base, kind):
 def compare_neutral(name, base, kinds, place):
     """Lines about neutral changes of a base that change an exit status or a number."""
     found = []
-    usual = numbers_of(call(base, base.files, place), place)
+    usual = numbers_of(call_valid(base, place))
     for kind in kinds:
         files = change_neutrally(base, kind)
         if files is None or (name, kind) in NOT_NEUTRAL:
             continue
         outcome = call(base, files, place)
         found += [f"{name}, {kind}: {one}" for one in list_faults(base, outcome)]
-        if numbers_of(outcome, place) != usual:
+        if numbers_of(outcome) != usual:
             found.append(f"{name}, {kind}: other numbers; {outcome.err.strip()[:300]}")
     return found
 
