@@ -68,7 +68,7 @@ def spoilt_folder(base, rng, names=()):
 def _spoilt_file(name, data, rng):
     if rng.random() < 0.08:
         return WHOLE[rng.integers(len(WHOLE))]
-    if rng.random() < 0.04:
+    if rng.random() < 0.04 or not data:
         return _other_bytes(data, rng)
     if name.endswith(".xlsx"):
         return _spoilt_book(data, rng)
@@ -210,8 +210,10 @@ def _spoilt_book(data, rng):
             parts = {name: book.read(name) for name in book.namelist()}
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, EOFError, RuntimeError):
         return _other_bytes(data, rng)
+    if not parts:
+        return _other_bytes(data, rng)
     sheets = [name for name in parts if "worksheets/" in name or "sharedStrings" in name]
-    name = str(rng.choice(sheets if rng.random() < 0.9 else sorted(parts)))
+    name = str(rng.choice(sheets if sheets and rng.random() < 0.9 else sorted(parts)))
     text = parts[name].decode(errors="replace")
     cells = list(re.finditer(r"<(v|t)>([^<]*)</", text))
     kind = int(rng.integers(6))
@@ -274,7 +276,7 @@ def _with_separator(separator, decimal):
                 stream.write(line + "\n")
                 continue
             writer.writerow(
-                re.sub(r"^(-?\d+)\.(\d+)$", rf"\1{decimal}\2", cell)
+                re.sub(r"^(-?\d+)\.(\d+(e-?\d+)?)$", rf"\1{decimal}\2", cell)
                 for cell in next(csv.reader([line], delimiter=_separator_of(data)))
             )
         return stream.getvalue().encode()
