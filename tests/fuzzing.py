@@ -2,10 +2,18 @@
 
 spoilt_folder(base, rng)    {file: bytes} with one to three things wrong
 spoilt_parts(parts, rng)    the same in the plain data of `job_builder`, for workbooks
+add_odd_file(files, rng)    the same files and one with an odd name
+NEUTRAL                     {name: change(file, bytes)} that changes no number; None: does not apply
 """
 
 import copy
+import csv
 import datetime
+import io
+import json
+import re
+import zipfile
+import zlib
 
 HOSTILE_CELLS = (
     "", " ", "nan", "-inf", "inf", "1e308", "-1e308", "1e-320", "1e400", "9" * 400, "0", "-0", "-1",
@@ -32,11 +40,27 @@ WHOLE = (
 )  # fmt: skip
 
 
-def spoilt_folder(base, rng):
-    """{name: bytes} of the files of `base` ({name: text or bytes}), spoilt."""
+HOSTILE_JSON = (
+    None, True, False, 0, -1, -0.0, 1e308, -1e308, 1e-320, float("nan"), float("inf"), 10**400,
+    "nan", "", " ", "x", "=1+1", "a" * 3000, "\u202e", "\U0001f600", "\u0000", "\ud800", [], {},
+    [[]], [None], {"a": 1}, [1, 2, 3], "2024-02-30", 1.5, "../../x", 10**15, -5, "\x1b[2J",
+)  # fmt: skip
+ODD_NAMES = (
+    "points (1).csv", ".~lock.points.csv#", "~$job.xlsx", "POINTS.CSV", "points.csv.bak", "é.csv",
+    "e\u0301.csv", "\u202ecsv.exe", "a\nb.csv", "\x1b[2Jx.csv", " .csv", "x.toml", "Thumbs.db",
+    "-.csv", "\udcff.csv", "record.json", "desktop.ini", "__MACOSX/points.csv", "job.TOML",
+    "courses.tsv",
+)  # fmt: skip
+
+
+def spoilt_folder(base, rng, names=()):
+    """{name: bytes} of the files of `base` ({name: text or bytes}), spoilt.
+
+    names  of the files that are spoilt; none: any
+    """
     files = {k: v.encode() if isinstance(v, str) else v for k, v in base.items()}
     for _ in range(rng.integers(1, 4)):
-        name = str(rng.choice(sorted(files)))
+        name = str(rng.choice(sorted(names or files)))
         files[name] = _spoilt_file(name, files[name], rng)
     return files
 
@@ -44,12 +68,16 @@ def spoilt_folder(base, rng):
 def _spoilt_file(name, data, rng):
     if rng.random() < 0.08:
         return WHOLE[rng.integers(len(WHOLE))]
-    if rng.random() < 0.04:
+    if rng.random() < 0.04 or not data:
         return _other_bytes(data, rng)
+    if name.endswith(".xlsx"):
+        return _spoilt_book(data, rng)
     try:
         text = data.decode()
     except UnicodeDecodeError:
         return _other_bytes(data, rng)
+    if name.endswith(".json") and rng.random() < 0.9:
+        return _spoilt_json(text, rng)
     if name.endswith((".toml", ".json")):
         return _spoilt_toml(text, rng).encode(errors="surrogatepass")
     return spoilt_csv(text, rng).encode(errors="surrogatepass")
@@ -131,6 +159,173 @@ def _spoilt_toml(text, rng):
             cut = int(rng.integers(len(lines[place]) + 1))
             lines[place] = lines[place][:cut] + hostile
     return "\n".join(lines) + "\n"
+
+
+def _spoilt_json(text, rng):
+    """A JSON text with a value, key, list or order that changed."""
+    try:
+        saved = json.loads(text)
+    except ValueError:
+        return _other_bytes(text.encode(errors="surrogatepass"), rng)
+    holder, key = _any_place(saved, rng)
+    if holder is None:
+        return text.encode()
+    value = holder[key]
+    match int(rng.integers(8)):
+        case 0:
+            del holder[key]
+        case 1 if isinstance(holder, dict):
+            holder[f"{key}x"] = holder.pop(key)
+        case 2 if isinstance(holder, list):
+            holder.insert(key, copy.deepcopy(value))
+        case 3 if isinstance(holder, list):
+            other = int(rng.integers(len(holder)))
+            holder[key], holder[other] = holder[other], value
+        case 4 if isinstance(value, int | float) and abs(value) < 1e300:
+            holder[key] = value * float(rng.choice([-1, 1e3, 1e-3, 1.1, 0]))
+        case 5 if isinstance(value, list):
+            holder[key] = value[::-1] if rng.random() < 0.5 else value[: len(value) // 2]
+        case _:
+            holder[key] = HOSTILE_JSON[rng.integers(len(HOSTILE_JSON))]
+    return json.dumps(saved, ensure_ascii=bool(rng.integers(2))).encode(errors="surrogatepass")
+
+
+def _any_place(saved, rng):
+    """(list or object, index or key) of any value in JSON content; (None, None): it has no part."""
+    holder, key, value = None, None, saved
+    while isinstance(value, list | dict) and value and (holder is None or rng.random() < 0.85):
+        holder = value
+        keys = range(len(value)) if isinstance(value, list) else sorted(value)
+        key = keys[int(rng.integers(len(keys)))]
+        value = holder[key]
+    return holder, key
+
+
+def _spoilt_book(data, rng):
+    """A workbook with a cell, a sheet or a byte that changed."""
+    if rng.random() < 0.15 or not zipfile.is_zipfile(io.BytesIO(data)):
+        return _other_bytes(data, rng)
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as book:
+            parts = {name: book.read(name) for name in book.namelist()}
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, EOFError, RuntimeError):
+        return _other_bytes(data, rng)
+    if not parts:
+        return _other_bytes(data, rng)
+    sheets = [name for name in parts if "worksheets/" in name or "sharedStrings" in name]
+    name = str(rng.choice(sheets if sheets and rng.random() < 0.9 else sorted(parts)))
+    text = parts[name].decode(errors="replace")
+    cells = list(re.finditer(r"<(v|t)>([^<]*)</", text))
+    kind = int(rng.integers(6))
+    if kind == 0:
+        del parts[name]
+    elif kind == 1:
+        parts[name] = parts[name][: int(rng.integers(len(parts[name]) + 1))]
+    elif cells:
+        cell = cells[int(rng.integers(len(cells)))]
+        hostile = HOSTILE_CELLS[rng.integers(len(HOSTILE_CELLS))]
+        hostile = re.sub("[<&\0]", "", hostile)
+        changed = text[: cell.start(2)] + hostile + text[cell.end(2) :]
+        parts[name] = changed.encode(errors="surrogatepass")
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as book:
+        for part, content in parts.items():
+            book.writestr(part, content)
+    return stream.getvalue()
+
+
+def add_odd_file(files, rng):
+    """The files and one more, whose name an editor, an archive or an attacker left there."""
+    odd = ODD_NAMES[int(rng.integers(len(ODD_NAMES)))]
+    return {odd: files[sorted(files)[int(rng.integers(len(files)))]]} | files
+
+
+# ---- changes that change no number
+
+
+def _lines_of(data):
+    return data.decode().split("\n")
+
+
+def _of_text(change):
+    """A change of the text of any file."""
+    return lambda name, data: change(data.decode())
+
+
+def _of_lines(change, *endings):
+    """A change of each line that is not blank, in files whose names have these endings."""
+
+    def changed(name, data):
+        if not name.endswith(endings):
+            return None
+        return "\n".join(change(one) if one.strip() else one for one in _lines_of(data)).encode()
+
+    return changed
+
+
+def _with_separator(separator, decimal):
+    """The cells of a CSV file between other marks."""
+
+    def changed(name, data):
+        if not name.endswith(".csv"):
+            return None
+        stream = io.StringIO()
+        writer = csv.writer(stream, delimiter=separator, lineterminator="\n")
+        for line in _lines_of(data):
+            if not line.strip() or line.startswith("#"):
+                stream.write(line + "\n")
+                continue
+            writer.writerow(
+                re.sub(r"^(-?\d+)\.(\d+(e-?\d+)?)$", rf"\1{decimal}\2", cell)
+                for cell in next(csv.reader([line], delimiter=_separator_of(data)))
+            )
+        return stream.getvalue().encode()
+
+    return changed
+
+
+def _separator_of(data):
+    first = next(line for line in _lines_of(data) if line.strip() and not line.startswith("#"))
+    return max(",;\t", key=first.count)
+
+
+def _quote_cells(name, data):
+    if not name.endswith(".csv"):
+        return None
+    mark = _separator_of(data)
+    lines = [
+        mark.join(f'"{cell}"' for cell in line.split(mark))
+        if line.strip() and not line.startswith("#") and '"' not in line
+        else line
+        for line in _lines_of(data)
+    ]
+    return "\n".join(lines).encode()
+
+
+def _add_comments(name, data):
+    if not name.endswith((".csv", ".toml")):
+        return None
+    return b"# a comment; with, marks = 1\n" + data.rstrip(b"\n") + b"\n# the end\n"
+
+
+NEUTRAL = {
+    "BOM": _of_text(lambda text: b"\xef\xbb\xbf" + text.encode()),
+    "UTF-16": _of_text(lambda text: text.encode("utf-16")),
+    "UTF-16 BE": _of_text(lambda text: b"\xfe\xff" + text.encode("utf-16-be")),
+    "LF": _of_text(lambda text: text.replace("\r\n", "\n").encode()),
+    "CRLF": _of_text(lambda text: re.sub("\r?\n", "\r\n", text).encode()),
+    "CR": _of_text(lambda text: re.sub("\r?\n", "\r", text).encode()),
+    "BOM and CRLF": _of_text(lambda text: b"\xef\xbb\xbf" + re.sub("\r?\n", "\r\n", text).encode()),
+    "blank lines at the end": _of_text(lambda text: (text + "\n\n \n").encode()),
+    "no line end at the end": _of_text(lambda text: text.rstrip("\r\n").encode()),
+    "spaces at the end of lines": _of_lines(lambda line: line + "  ", ".csv", ".toml", ".json"),
+    "semicolons": _with_separator(";", "."),
+    "semicolons and decimal commas": _with_separator(";", ","),
+    "tabs": _with_separator("\t", "."),
+    "tabs and decimal commas": _with_separator("\t", ","),
+    "quoted cells": _quote_cells,
+    "comments": _add_comments,
+}
 
 
 def spoilt_parts(parts, rng):

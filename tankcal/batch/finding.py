@@ -16,7 +16,13 @@ from pathlib import Path
 
 from tankcal.batch.asked import OWN, Asked
 from tankcal.errors import InputError, Problem, reason_of
-from tankcal.job.folder import decode, results_given_as_job
+from tankcal.job.folder import (
+    decode,
+    is_row,
+    results_given_as_job,
+    separator_of_text,
+    split_lines,
+)
 from tankcal.job.tables import (
     SETTINGS_FILE,
     SETTINGS_SHEET,
@@ -25,6 +31,7 @@ from tankcal.job.tables import (
     read_bytes,
 )
 from tankcal.messages import message
+from tankcal.text.delimited import split_cells
 from tankcal.text.naming import file_name
 
 RECORD = "record.json"
@@ -234,12 +241,12 @@ def _is_job(book):
 
 def _listed(path, wants, log):
     """The jobs of a list: a line each, or a CSV file with a column job; paths from its folder."""
-    data = read_bytes(path, log, MOST_LIST_BYTES)
+    data, is_csv = read_bytes(path, log, MOST_LIST_BYTES), path.suffix.lower() == ".csv"
     text = None if data is None else decode(path.name, data, log)
     if text is None:
         return []
-    lines, told = text.splitlines(), len(log.problems)
-    rows = list(_rows(path, lines, log) if path.suffix.lower() == ".csv" else _plain_rows(lines))
+    told = len(log.problems)
+    rows = list(_rows(path, text, log)) if is_csv else _plain_rows(text.splitlines())
     found = []
     for own in rows:
         job = own.pop("job")
@@ -260,18 +267,21 @@ def _plain_rows(lines):
     return [{"job": one} for one in stripped if one and not one.startswith("#")]
 
 
-def _rows(path, lines, log):
+def _rows(path, text, log):
     """A dict for each row of a CSV list; [] after telling `log` what is wrong with it."""
-    if not lines:
+    mark = separator_of_text(text, ",")
+    lines = [(row, line) for row, line in enumerate(split_lines(text), 1) if is_row(line)]
+    table = []
+    for row, line in lines:
+        try:
+            table.append((row, split_cells(line, mark)))
+        except csv.Error as error:
+            log.problem(path.name, message("batch_no_csv", "no CSV ({reason})", reason=str(error)),
+                        row)  # fmt: skip
+            return []
+    if not table:
         return []
-    mark = ";" if lines[0].count(";") > lines[0].count(",") else ","
-    try:
-        table = list(csv.reader(lines, delimiter=mark, strict=True))
-    except csv.Error as error:
-        text = message("batch_no_csv", "no CSV ({reason})", reason=str(error))
-        log.problem(path.name, text)
-        return []
-    headings = [one.strip() for one in table[0]]
+    row, headings = table[0]
     wrong = [one for one in headings if one not in HEADINGS]
     if wrong or HEADINGS[0] not in headings or len(set(headings)) < len(headings):
         text = message(
@@ -280,21 +290,21 @@ def _rows(path, lines, log):
             found=headings[:10],
             others=[*HEADINGS[1:]],
         )
-        log.problem(path.name, text, 1)
+        log.problem(path.name, text, row)
         return []
     return list(_dicts(path, headings, table[1:], log))
 
 
 def _dicts(path, headings, table, log):
-    for row, cells in enumerate(table, start=2):
-        if not any(cell.strip() for cell in cells):
+    for row, cells in table:
+        if not any(cells):
             continue
         if len(cells) > len(headings):
             text = message("batch_long_row", "{found} cells; expected at most {most}",
                            found=len(cells), most=len(headings))  # fmt: skip
             log.problem(path.name, text, row)
             continue
-        own = dict(zip(headings, (cell.strip() for cell in cells), strict=False))
+        own = dict(zip(headings, cells, strict=False))
         if own.get("job"):
             yield own
         else:

@@ -254,7 +254,12 @@ def _say_next(folder, survey):
         )
         say(text)
         of_survey = "" if survey is None else f" --survey {survey}"
-        print(f"  tankcal new {shlex.quote(str(job))}{of_survey}")
-        print(f"  tankcal import ... --out {shlex.quote(str(job))}")
+        print(f"  tankcal new {_quoted(job)}{of_survey}")
+        print(f"  tankcal import ... --out {_quoted(job)}")
     say(message("import_next", "then"))
-    print(f"  tankcal run {shlex.quote(str(job))}")
+    print(f"  tankcal run {_quoted(job)}")
+
+
+def _quoted(path):
+    """A path as a shell takes it; its control characters are spelt out."""
+    return printable(shlex.quote(str(path)))

@@ -55,7 +55,10 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
         return None
     if found == "jxl":
         is_plain = find_encoding(data) == "utf-8"  # the bytes of letters in UTF-16 can be controls
-        return jobxml.read(data.strip(_AROUND_BYTES + b"\r\n\t ") if is_plain else data, file, log)
+        if is_plain:
+            return jobxml.read(data.strip(_AROUND_BYTES + b"\r\n\t "), file, log)
+        # An editor that writes UTF-16 leaves encoding="UTF-8" in the declaration.
+        return jobxml.read(text.strip().encode(errors="replace"), file, log, "utf-8")
     for row, line in enumerate(text.split("\n"), 1):
         if len(line) > MAX_LINE and not (found == "gsi" and gsi.LINE.match(line)):
             expected = message("line_too_long", "a line of more than {most} characters; expected a"

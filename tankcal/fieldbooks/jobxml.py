@@ -24,11 +24,14 @@ class _Refused(Exception):
     """The file cannot be read on; it is told."""
 
 
-def read(data, file, log):
-    """FieldBook of the bytes of a JobXML file."""
+def read(data, file, log, encoding=None):
+    """FieldBook of the bytes of a JobXML file.
+
+    encoding  of the bytes; None: as the file declares it
+    """
     book = FieldBook(file, "jxl")
     taker = _Taker(book, log)
-    parser = expat.ParserCreate()
+    parser = expat.ParserCreate(encoding)
     parser.buffer_text = True
     parser.StartElementHandler = taker.start
     parser.EndElementHandler = taker.end

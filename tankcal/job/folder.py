@@ -28,7 +28,7 @@ from tankcal.job.tables import (
 )
 from tankcal.messages import message
 from tankcal.text.decoding import WESTERN, decode_text, is_western
-from tankcal.text.delimited import separator_of_table
+from tankcal.text.delimited import separator_of_table, split_cells
 from tankcal.text.spreadsheets import unguard_formula
 
 SAVED_FILES = (  # what commands save; a folder with such a file and no job.toml holds results
@@ -235,7 +235,8 @@ def _utf8(file):
     )
 
 
-def _lines(text):
+def split_lines(text):
+    """Lines of a text with the line ends of any system."""
     return re.split("\r\n|\r|\n", text)
 
 
@@ -297,7 +298,7 @@ def parsed_toml(file, data, log):
     text = decode(file, data, log)
     if text is None:
         return None
-    for number, line in enumerate(_lines(text), 1):
+    for number, line in enumerate(split_lines(text), 1):
         if len(line) > MAX_SETTINGS_LINE:
             log.problem(
                 file,
@@ -316,7 +317,7 @@ def _content(file, text, log):
 
     A decimal comma is told and read as a point, so that all else is judged in the same run.
     """
-    lines = text.split("\n")  # as tomllib counts them
+    lines = split_lines(text)  # tomllib itself takes no lone carriage return for the end of a line
     for _ in range(MAX_PROBLEMS_PER_FILE):
         try:
             return tomllib.loads("\n".join(lines))
@@ -359,7 +360,7 @@ def _reason(error):
 def _toml_rows(text):
     """Row of each section and 'section.key', for messages only."""
     rows, section = {}, ""
-    for number, line in enumerate(_lines(text), 1):
+    for number, line in enumerate(split_lines(text), 1):
         heading = re.match(r"[ \t]*\[+([^\[\]]+)\]", line)
         key = re.match(r"[ \t]*([\w.\"'-]+)[ \t]*=", line)
         if heading:
@@ -461,7 +462,7 @@ def has_too_many_lines(file, text, log, most=MAX_LINES):
 
 def separator_of_text(text, usual):
     """The separator of the text of a CSV file with comments; `usual` where it has one column."""
-    return separator_of_table([line for line in _lines(text) if is_row(line)], usual)
+    return separator_of_table([line for line in split_lines(text) if is_row(line)], usual)
 
 
 def is_row(line):
@@ -474,15 +475,14 @@ def _csv_rows(file, text, separator, log):
 
     A cell holds no line break, so that a forgotten quotation mark spoils one row, not the file.
     """
-    for number, line in enumerate(_lines(text), 1):
+    for number, line in enumerate(split_lines(text), 1):
         if not is_row(line):
             continue
         if '"' not in line and "'" not in line:
             yield number, line.split(separator)
             continue
         try:
-            reader = csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True)
-            yield number, [unguard_formula(cell.strip()) for cell in next(reader)]
+            yield number, [unguard_formula(cell) for cell in split_cells(line, separator)]
         except csv.Error:
             log.problem(
                 file,

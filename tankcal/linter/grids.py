@@ -13,7 +13,7 @@ from tankcal.linter.pdf_grids import tables_of_text
 from tankcal.linter.pdf_text import pages_of
 from tankcal.messages import message
 from tankcal.record import FORMAT, version_of
-from tankcal.text.delimited import find_separator
+from tankcal.text.delimited import find_separator, split_cells
 
 MOST_LINES = 100_000
 
@@ -144,7 +144,7 @@ def _csv(file, text, log):
     rows = []
     for number, line in lines:
         try:
-            cells = next(csv.reader([line], delimiter=separator, strict=True))
+            cells = split_cells(line, separator)
         except csv.Error:
             log.problem(
                 file,

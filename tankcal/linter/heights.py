@@ -7,7 +7,7 @@ import numpy as np
 
 from tankcal.messages import message
 
-_FEWEST_ROWS = 3
+FEWEST_ROWS = 3
 _EXACT = 1e-6  # of a step
 _SHORTEST_ZONE = 3  # steps
 _MOST_STRAY = 100  # rows out of order that are told one by one
@@ -37,12 +37,12 @@ def series_of(table, log, even_steps=True):
     even_steps  False: rows stand where they are needed, and no step says that one is missing
     """
     entries = [entry for entry in table.entries if _is_readable(table, entry, log)]
-    if len(entries) < _FEWEST_ROWS:
+    if len(entries) < FEWEST_ROWS:
         expected = message(
             "lint_few_rows",
             "{count} rows of heights and volumes; expected {fewest} or more",
             count=len(entries),
-            fewest=_FEWEST_ROWS,
+            fewest=FEWEST_ROWS,
         )
         log.problem(table.name, expected)
         return None
@@ -71,14 +71,14 @@ def series_of(table, log, even_steps=True):
     height, keep = _in_order(teller, step, tolerance)
     order = _rising(height, np.flatnonzero(keep), tolerance)
     entries, height = [entries[k] for k in order], height[order]
-    if len(entries) < _FEWEST_ROWS:
+    if len(entries) < FEWEST_ROWS:
         log.problem(
             table.name,
             message(
                 "lint_few_rising",
                 "{count} heights that rise; expected {fewest} or more",
                 count=len(entries),
-                fewest=_FEWEST_ROWS,
+                fewest=FEWEST_ROWS,
             ),
         )
         return None

@@ -6,6 +6,7 @@ from itertools import groupby, pairwise
 import numpy as np
 
 from tankcal.linter.examination import examine
+from tankcal.linter.heights import FEWEST_ROWS
 from tankcal.linter.numbers import BLANK
 from tankcal.messages import message
 
@@ -117,7 +118,15 @@ def volumes_of(table, series, log):
         for k, entry in enumerate(series.entries)
         if k not in left_out and _is_readable(table, entry, log)
     ]
-    if len(good) < 3:
+    if len(good) < FEWEST_ROWS:
+        if not log.problems:  # long blanks alone: a cell that cannot be read is a problem
+            expected = message(
+                "lint_few_volumes",
+                "{count} rows with a volume; expected {fewest} or more",
+                count=len(good),
+                fewest=FEWEST_ROWS,
+            )
+            log.problem(table.name, expected)
         return None
     entries = [series.entries[k] for k in good]
     _check_marks(table, entries, log)

@@ -1,6 +1,5 @@
 """What `tankcal compare` is given: two tables, what is declared of them, courses, a rule."""
 
-import tomllib
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from tankcal.errors import InputError
+from tankcal.job.folder import parsed_toml
 from tankcal.job.rule_files import named_rule
 from tankcal.job.tables import Log
 from tankcal.messages import message
@@ -15,7 +15,6 @@ from tankcal.recalibration.comparison import compare
 from tankcal.recalibration.read_courses import read_courses
 from tankcal.recalibration.reading import read_former
 from tankcal.record.comparison import ComparisonFile
-from tankcal.text.decoding import decode_text
 
 RECORD = "record.json"
 
@@ -109,7 +108,8 @@ def rows_file(path):
     """The file that holds the rows: beside a former.toml the one that it names."""
     if path.suffix.lower() != ".toml":
         return path
-    return path.parent / tomllib.loads(decode_text(path.read_bytes()))["former"]["file"]
+    content, _ = parsed_toml(path.name, path.read_bytes(), Log())
+    return path.parent / content["former"]["file"]
 
 
 def read_shell(path, log):

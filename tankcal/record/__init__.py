@@ -20,6 +20,8 @@ __all__ = [
 ]  # fmt: skip
 
 ROWS_AT_ONCE = 1000  # of a table, as JSON
+MOST_HEIGHT_M = 1000
+MOST_VOLUME_M3 = 1e9  # the largest tanks and ships hold less than 1e6
 VOLUME_ROUNDING = 1e-9  # of the fullest tank: what rounding may make a table fall
 _JSON = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
@@ -149,16 +151,30 @@ def _refuse_impossible(record, name):
     """Raise InputError for a capacity table that no tank has."""
     if record["capacity"] is None:
         return
+    heights = np.asarray(record["capacity"]["height_m"], dtype=float)
     volumes = np.asarray(record["capacity"]["volume_m3"], dtype=float)
+    rises = np.diff(heights) > 0  # nan does not
+    if len(heights) != len(volumes) or not (rises.all() and np.all(heights < MOST_HEIGHT_M)):
+        expected = message(
+            "record_heights",
+            "has a capacity table whose {count} heights do not rise up to at most {most} m, one "
+            "for each of its {volumes} volumes; expected such heights: run the job again",
+            count=len(heights),
+            most=MOST_HEIGHT_M,
+            volumes=len(volumes),
+        )
+        raise InputError(Problem(name, expected))
     least = -VOLUME_ROUNDING * np.max(np.abs(volumes), initial=0.0)
     falls = ~(np.diff(volumes, prepend=0.0) >= least)  # nan, too
-    if falls.any():
-        row = int(np.argmax(falls))
+    is_impossible = falls | (volumes > MOST_VOLUME_M3)
+    if is_impossible.any():
+        row = int(np.argmax(is_impossible))
         expected = message(
             "record_impossible",
-            "has a capacity table that falls or is below 0 (row {row}: {volume} m3); expected "
-            "volumes that rise: run the job again",
+            "has a capacity table that falls, is below 0 or above {most} m3 (row {row}: {volume} "
+            "m3); expected volumes that rise: run the job again",
             row=row + 1,
+            most=f"{MOST_VOLUME_M3:g}",
             volume=f"{volumes[row]:g}",
         )
         raise InputError(Problem(name, expected))

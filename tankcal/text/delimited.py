@@ -1,4 +1,7 @@
-"""Which mark separates the cells of a text table, by the text itself."""
+"""Cells of the lines of a text table, and the mark between them, by the text itself."""
+
+import csv
+import re
 
 BY_CERTAINTY = (";", "\t", ",")  # a comma may be a decimal mark
 
@@ -32,3 +35,34 @@ def separator_of_table(lines, usual):
     if len(found) == 1:
         return found[0]
     return find_separator(lines) if found else usual
+
+
+def split_cells(line, separator):
+    """Cells of a line of a CSV file without the blanks around them; a cell holds no line break.
+
+    Raises
+    ------
+    csv.Error
+        The line has quotation marks without a partner.
+
+    Examples
+    --------
+    >>> split_cells('a, "b ""c""; d" ,e  ', ",")
+    ['a', 'b "c"; d', 'e']
+    """
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(separator)]
+    try:
+        cells = _read_cells(line, separator)
+    except csv.Error:  # `csv` takes blanks before a quotation mark, but none behind it
+        cells = _read_cells(_BLANKS_BEHIND[separator].sub('"', line), separator)
+    return [cell.strip() for cell in cells]
+
+
+_BLANKS_BEHIND = {  # a quotation mark: blanks that end its cell
+    mark: re.compile(rf'"[^\S{mark}]+(?={mark}|$)') for mark in BY_CERTAINTY
+}
+
+
+def _read_cells(line, separator):
+    return next(csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True))

@@ -6,6 +6,7 @@ Truth: the same jobs by `tankcal run`; what is done again is counted in the jour
 import csv
 import errno
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -519,3 +520,13 @@ def test_a_job_that_cannot_be_read_is_told_once(two, monkeypatch):
     ((name, status, problems, _),) = ended
     assert (name, status, problems[0]["code"]) == ("T-0", "failed", "batch_input_unreadable")
     assert batch.counts == {"failed": 1, "done": 1}
+
+
+def test_a_folder_whose_name_is_no_utf8(tmp_path):
+    site = tmp_path / os.fsdecode(b"site-\xff")
+    write_jobs(site, 1)
+    batch = ["batch", str(site), "--workers", "0", "--no-papers", "--quiet"]
+    assert main([*batch, "--out", str(tmp_path / "out")]) == 0
+    rows = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["rows"]
+    assert rows[0]["source"].endswith("site-?/T-0")
+    assert "site-?" in (tmp_path / "out" / "summary.csv").read_text(encoding="utf-8")

@@ -90,10 +90,13 @@ def test_a_plain_list(site):
     assert names([f"@{site / 'jobs.txt'}"]) == ["T-1", "T-9", "empty", "missing"]
 
 
-@pytest.mark.parametrize("mark", [",", ";"])
-def test_a_list_with_columns(site, mark):
+@pytest.mark.parametrize("mark", [",", ";", "\t", '" ,"'])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_a_list_with_columns(site, mark, end):
     rows = [("name", "job", "profile"), ("First", "north/T-0", "csv"), ("", "north/T-1", "")]
-    (site / "jobs.csv").write_text("\n".join(mark.join(one) for one in rows) + "\n\n")
+    quote = '"' if '"' in mark else ""
+    lines = ["# the north", *(quote + mark.join(one) + quote for one in rows), "", " "]
+    (site / "jobs.csv").write_text(end.join(lines), newline="")
     found = find_jobs([str(site / "jobs.csv")], Asked(profile="jd-edwards"))
     assert [(one.name, one.asked.profile) for one in found] == [
         ("First", "csv"),

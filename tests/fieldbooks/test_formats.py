@@ -443,6 +443,15 @@ def test_a_folder_without_a_job_is_told_how_to_go_on(tmp_path, capsys):
     assert run == ["run", f"{out}-job"]
 
 
+def test_the_name_of_a_folder_acts_on_no_terminal(tmp_path, capsys):
+    book = tmp_path / "book.rw5"
+    book.write_text(RW5)
+    assert main(["import", str(book), "--out", str(tmp_path / "\x1b[2Jx")]) == 0
+    printed = capsys.readouterr()
+    assert "\\x1b[2Jx" in printed.out
+    assert "\x1b" not in printed.out + printed.err
+
+
 def test_json_and_another_language(tmp_path, capsys):
     book = tmp_path / "book.rw5"
     book.write_text(RW5)

@@ -8,6 +8,7 @@ import os
 
 import numpy as np
 import pytest
+from called_commands import COARSE, FULL, LYING
 from conftest import EXAMPLE
 from draws import draws
 from fuzzing import spoilt_csv, spoilt_folder, spoilt_parts
@@ -24,29 +25,14 @@ from tankcal.planning.reading import load_plan
 pytestmark = pytest.mark.slow
 
 FEW, MANY = 60, draws(200, 3000)  # of each kind: in every run of the tests, in the study
-FULL = {
-    "uncertainty": [("datum", 1.0, "mm", "B", "normal", 50), ("scale", 20, "ppm")],
-    "deadwood": [("coil", 0.5, 1.0, -0.2, 0.01), ("manhole", 0.6, 1.2, 0.05, 0.01)],
-    "bottom": [(float(x), float(y), -0.01 * x, 1.0) for x in (-4, 0, 4) for y in (-4, 0, 4)],
-    "roof": {},
-    "courses": 2,
-    "points_per_ring": 12,
-    "sd_mm": 2.0,
-}
-COARSE = {"table.step_m": 0.5}
 METERED = {"table__step_m": 0.5}
 
 
 def bases():
     """{name: (Parts, whether what is read is computed, too)}."""
-    lying = {
-        "horizontal.tilt_mm_per_m": 5.0,
-        "datum.dip_plate_z_m": None,
-        **COARSE,
-    }
     return {
         "vertical": (job_parts(settings=COARSE, **FULL), True),
-        "lying": (job_parts(kind="horizontal", settings=lying, deadwood=FULL["deadwood"]), True),
+        "lying": (job_parts(**LYING), True),
         "sphere": (job_parts(kind="sphere", settings=COARSE), True),
         "survey": (survey_parts(), False),
         "liquid": (
@@ -75,6 +61,12 @@ def folders(tmp_path_factory):
         found[name] = text_files(write_folder(place / name, parts)), computed
     found["stations"] = text_files(EXAMPLE.parent / "total-station"), False
     return found
+
+
+def test_the_jobs_are_valid_before_they_are_spoilt(tmp_path):
+    for name, (parts, computed) in bases().items():
+        if computed:
+            run(load(write_folder(tmp_path / name, parts)))
 
 
 def told(act, *arguments):

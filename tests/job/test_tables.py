@@ -45,6 +45,14 @@ def test_spaces_before_quotation_marks_are_ignored():
     assert (table.headings, table.rows) == (("a", "b"), (("1", "x, y"),))
 
 
+@pytest.mark.parametrize("blanks", [" ", "  \u00a0 "])
+def test_blanks_behind_quotation_marks_are_ignored(blanks):
+    text = f'"a"{blanks},b,"c"{blanks}\n"x, ""y"""{blanks},"1" ,2{blanks}\n'
+    table, problems = csv_table(text.encode())
+    assert not problems
+    assert (table.headings, table.rows) == (("a", "b", "c"), (('x, "y"', "1", "2"),))
+
+
 @pytest.mark.parametrize(
     ("data", "row", "words"),
     [
@@ -151,6 +159,17 @@ def test_settings_are_no_csv_in_words_about_their_encoding():
     (problem,) = log.problems
     assert problem.row == 1
     assert problem.expected.endswith("not UTF-8; save the file as UTF-8 text")
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_toml_with_the_line_ends_of_any_system(end):
+    text = end.join(["# a comment", "[table]", 'unit = "m3"', "step_m = 0.01", "step_mm = 1,5", ""])
+    log = Log()
+    settings, sections = read_toml("job.toml", text.encode(), log)
+    step = settings["table"]["step_m"]
+    assert (step.raw, step.row) == (0.01, 4)
+    assert sections == {"table": 2}
+    assert [problem.row for problem in log.problems] == [5]
 
 
 def test_deeply_nested_settings_are_unknown_sections():

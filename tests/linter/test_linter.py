@@ -25,6 +25,7 @@ from tankcal.linter.examination import (
 from tankcal.linter.headings import heading_of
 from tankcal.linter.numbers import Style, read_number, style_of
 from tankcal.linter.volumes import suggestion
+from tankcal.recalibration.reading import read_former
 from tankcal.tank.dips import dip_label, table_heights
 
 
@@ -45,6 +46,16 @@ def found(report):
     for finding in report.findings:
         texts[finding.problem.row].append(str(finding))
     return {row: "\n".join(lines) for row, lines in texts.items()}
+
+
+@pytest.mark.parametrize("volumes", [0, 1, 2])
+def test_a_table_without_volumes_has_an_error(tmp_path, volumes):
+    rows = [(f"{k / 100:.2f}", f"{k}.5" if k < volumes else "") for k in range(20)]
+    report = lint_rows(tmp_path, rows)
+    assert report.errors == 1
+    assert f"{volumes} rows with a volume; expected 3 or more" in found(report)[None]
+    with pytest.raises(InputError, match="rows with a volume"):
+        read_former(tmp_path / "table.csv")
 
 
 # no false alarms

@@ -187,6 +187,18 @@ def test_tables_of_the_same_name_are_told_apart_by_their_folders(tmp_path):
     assert "but old/results/table.csv is of a vertical one" in said
 
 
+@pytest.mark.parametrize("end", ["\r\n", "\r"])
+def test_former_with_the_line_ends_of_any_system(tmp_path, end):
+    asked = write_tables(tmp_path)
+    lines = ["# known", "[former]", 'file = "old.csv"', *(tmp_path / "old.toml").read_text()
+             .splitlines()[1:]]  # fmt: skip
+    (tmp_path / "former.toml").write_text(end.join(lines), newline="")
+    known = compare_files(asked)
+    found = compare_files(replace(asked, old=tmp_path / "former.toml", former=None))
+    assert found.former.sha256 == known.former.sha256
+    assert found.courses == known.courses
+
+
 def test_courses_with_decimal_commas(tmp_path):
     commas = COURSES_CSV.replace(",", ";").replace(".", ",")
     asked = write_tables(tmp_path, **{"courses.csv": commas})

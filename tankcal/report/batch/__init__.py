@@ -27,9 +27,11 @@ def summary_files(found, language, folder):
     from tankcal.report.batch.pages import pages
     from tankcal.report.web import page
 
-    paper = SummaryPaper(found, language)
     text = json.dumps(found, ensure_ascii=False, allow_nan=False, indent=1)
-    (folder / JSON).write_text(text + "\n", encoding="utf-8", errors="replace")
+    data = text.encode("utf-8", "replace")  # names of files may have bytes that are no UTF-8
+    (folder / JSON).write_bytes(data + b"\n")
+    found = json.loads(data)
+    paper = SummaryPaper(found, language)
     write_table(FILE_OF_JOBS, folder / CSV, [paper.plain_row(one) for one in found["rows"]])
     workbook.write(paper, folder / WORKBOOK)
     blocks = [one.data for one in pages(paper)]
