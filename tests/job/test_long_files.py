@@ -22,7 +22,7 @@ def unread(monkeypatch):
     def split(text):
         raise AssertionError("lines were made of a text that has too many")
 
-    monkeypatch.setattr(folder, "_lines", split)
+    monkeypatch.setattr(folder, "split_lines", split)
     monkeypatch.setattr(grids.re, "split", lambda _pattern, text: split(text))
 
 
