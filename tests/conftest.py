@@ -132,7 +132,7 @@ def figure(record_property):
 
 
 def pytest_addoption(parser):
-    parser.addoption("--part", metavar="K/N", help="of slow tests and studies only part K of N, by their names")
+    parser.addoption("--part", metavar="K/N", help="part K of N of the slow tests and studies")
 
 
 def pytest_configure(config):
