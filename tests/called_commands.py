@@ -183,7 +183,8 @@ def list_faults(base, outcome):
         faults += [f"{name}: {one}" for name, data in outcome.after.items()
                    if name not in outcome.before or outcome.before[name] != data
                    for one in _list_table_faults(name, data)]  # fmt: skip
-        faults += _list_number_faults("standard output", outcome.out)
+        if "--json" in base.arguments:
+            faults += _list_number_faults("standard output", outcome.out)
     left = [name for name in outcome.after if ".tankcal-" in name]
     return faults + [f"left behind: {name}" for name in left]
 
@@ -209,9 +210,7 @@ def _list_table_faults(name, data):
 
 
 def _list_number_faults(name, text):
-    """Faults of the numbers of a JSON text; text that is no JSON has none."""
-    if not text.lstrip().startswith(("{", "[")):
-        return []
+    """Faults of the numbers of a JSON text."""
     constants = []
     try:
         saved = json.loads(text, parse_constant=constants.append)
@@ -251,7 +250,7 @@ def make_bases(folder, makers=MAKERS, leave=()):
     for maker in makers:
         for name, base in globals()[f"_make_{maker}"](folder / maker).items():
             if name not in leave:
-                yield name, _with_results(base, folder / "first" / name)
+                yield name, _with_results(base, folder / "first" / name.replace(" ", "-"))
 
 
 def _with_results(base, place):
