@@ -78,7 +78,7 @@ COUNTED = ("reached", "controlled", "draws", "tolerance")  # of a row that was d
 
 # How many rows are simulated: in all, of bent ones, and of those that need plain draws. The other
 # rows of a longer table are interpolated between them.
-MOST_ROWS, MOST_BENT, MOST_PLAIN = 800, 60, 16
+MOST_ROWS, MOST_BENT, MOST_PLAIN = 800, 60, 40
 
 
 class Model:
