@@ -115,7 +115,7 @@ def _why_not(measurements, message):
     lost = photos_that_do_not_fit(measurements, message, _tried)
     return (
         lost
-        or likely_mistake(measurements, np.inf, _tried)
+        or likely_mistake(measurements, np.inf, _tried, message)
         or wrong_control(measurements, np.inf, _tried)[0]
     )
 

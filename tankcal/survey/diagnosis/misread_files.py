@@ -28,21 +28,26 @@ EXCHANGED = 7  # control points of which each two are exchanged
 CONTROL = "control.csv"
 MOST_SETUPS = 30  # whose circles are supposed, one after the other, to show another unit
 MOST = 12  # photos that are left out one after the other
+ALIKE_FAILURES = 10  # trials that end as the survey itself did: then readings are missing
 
 
-def likely_mistake(measurements, sigma0, run):
+def likely_mistake(measurements, sigma0, run, failure=None):
     """Problem rows: the common mistakes that explain best why a survey does not fit, or none.
 
-    sigma0  without data snooping, inf when the survey could not be adjusted
-    run     run(measurements) -> (network.Adjusted, Gathered), without data snooping
+    sigma0   without data snooping, inf when the survey could not be adjusted
+    run      run(measurements) -> (network.Adjusted, Gathered), without data snooping
+    failure  the text of the error by which the survey could not be adjusted
     """
     limit = min(BETTER * sigma0, SOUND)
-    explained = []
-    for suppositions in (_mirrored, _exchanged, _in_other_units, _of_a_setup):
+    explained, alike = [], 0
+    for suppositions in (_mirrored, _in_other_units, _exchanged, _of_a_setup):
         for problem, changed in suppositions(measurements):
             try:
                 found = run(changed)[0].sigma0
-            except (SolutionError, InputError):
+            except (SolutionError, InputError) as error:
+                alike += str(error) == failure
+                if alike == ALIKE_FAILURES and not explained:
+                    return []
                 continue
             if found < limit:
                 explained.append((found, problem))
