@@ -21,6 +21,7 @@ __all__ = [
 
 ROWS_AT_ONCE = 1000  # of a table, as JSON
 MOST_HEIGHT_M = 1000
+NOT_NEGATIVE = ("u_m3", "U_m3", "k", "area_m2")  # columns of the capacity table
 MOST_VOLUME_M3 = 1e9  # the largest tanks and ships hold less than 1e6
 VOLUME_ROUNDING = 1e-9  # of the fullest tank: what rounding may make a table fall
 _JSON = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
@@ -164,6 +165,17 @@ def _refuse_impossible(record, name):
             volumes=len(volumes),
         )
         raise InputError(Problem(name, expected))
+    for column in NOT_NEGATIVE:
+        values = np.asarray(record["capacity"][column], dtype=float)  # nan: it is not known
+        if len(values) != len(volumes) or np.any(values < 0):
+            expected = message(
+                "record_column",
+                "{count} values, or some below 0; expected 0 or more for each of the {rows} rows of "
+                "the table: run the job again",
+                count=len(values),
+                rows=len(volumes),
+            )
+            raise InputError(Problem(name, expected, column=f"capacity.{column}"))
     least = -VOLUME_ROUNDING * np.max(np.abs(volumes), initial=0.0)
     falls = ~(np.diff(volumes, prepend=0.0) >= least)  # nan, too
     is_impossible = falls | (volumes > MOST_VOLUME_M3)

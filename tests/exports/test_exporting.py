@@ -3,6 +3,7 @@
 import csv
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -238,6 +239,18 @@ def test_tables_that_cannot_be_exported(height, volume, code, tmp_path):
     with pytest.raises(InputError) as error:
         export_record(written_record(tmp_path, height, volume), OURS, points=3)
     assert codes(error) == [code]
+
+
+@pytest.mark.parametrize("column", ["u_m3", "U_m3", "k", "area_m2"])
+@pytest.mark.parametrize("change", [lambda values: values[:-1], lambda values: [-1.0, *values[1:]]])
+def test_columns_that_do_not_fit_their_table(column, change, lying_record, tmp_path):
+    record = json.loads(Path(lying_record).read_text())
+    record["capacity"][column] = change(record["capacity"][column])
+    path = tmp_path / "record.json"
+    path.write_text(json.dumps(record))
+    with pytest.raises(InputError) as error:
+        export_record(path, OURS, points=9)
+    assert codes(error) == ["record_column"]
 
 
 def test_levels_that_coincide_are_left_out(tmp_path):
