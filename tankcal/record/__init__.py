@@ -170,8 +170,8 @@ def _refuse_impossible(record, name):
         if len(values) != len(volumes) or np.any(values < 0):
             expected = message(
                 "record_column",
-                "{count} values, or some below 0; expected 0 or more for each of the {rows} rows of "
-                "the table: run the job again",
+                "{count} values, or some below 0; expected 0 or more for each of the {rows} rows "
+                "of the table: run the job again",
                 count=len(values),
                 rows=len(volumes),
             )
