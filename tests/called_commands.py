@@ -74,7 +74,7 @@ class Base:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one call in a folder gave: files before and after it as {path: bytes}."""
+    """Result of one call in a folder, with the files before and after it as {path: bytes}."""
 
     place: Path
     status: int | None
@@ -358,17 +358,16 @@ def _make_results(folder):
     assert cli.main(["run", str(job), "--no-papers", "--quiet"]) == 0
     record = {"record.json": (job / "results" / "record.json").read_bytes()}
     whole = read_tree(job)
-    comparing = read_example("compare")
+    former = read_example("compare")
     new = folder / "new"
     write_tree(new, read_example("strapping"))
     assert cli.main(["run", str(new), "--no-papers", "--quiet"]) == 0
-    comparing["new.json"] = (new / "results" / "record.json").read_bytes()
+    comparing = former | {"new.json": (new / "results" / "record.json").read_bytes()}
     tall = [k / 20 for k in range(49)]
     solid = {"record.json": written_record(folder, tall, list(map(float, map(lying, tall))))
              .read_bytes()}  # fmt: skip
     profiles = EXAMPLES.parent / "tankcal" / "exports" / "shipped_profiles"
     profile = {"profile.toml": (profiles / "signet-9900.toml").read_bytes()}
-    former = read_example("compare")
     return {
         "verify": Base(("verify", "{in}/results", "--quiet"), whole, exact=tuple(whole),
                        complains=False),
@@ -575,7 +574,7 @@ _NAMES = ("files", "warnings", "sha256", "file", "source", "tankcal", "versions"
 
 
 def numbers_of(outcome):
-    """What must not change by a neutral change: exit status, printed lines, tables, records."""
+    """Exit status, printed lines, tables and records, which a neutral change keeps."""
     if outcome.status:
         return outcome.status, _codes_in(outcome)
     written = {

@@ -167,14 +167,13 @@ def pytest_collection_modifyitems(config, items):
                 item.own_markers.remove(mark)
     if config.option.part:
         part, of = map(int, config.option.part.split("/"))
-        others = [
-            item
-            for item in items
-            if (item.get_closest_marker("slow") or item.get_closest_marker("study"))
-            and crc32(f"{item.path.name}::{item.originalname}".encode()) % of != part % of
-        ]
+        kept, others = [], []
+        for item in items:
+            is_long = item.get_closest_marker("slow") or item.get_closest_marker("study")
+            number = crc32(f"{item.path.name}::{item.originalname}".encode()) % of
+            (others if is_long and number != part % of else kept).append(item)
         config.hook.pytest_deselected(items=others)
-        items[:] = [item for item in items if item not in set(others)]
+        items[:] = kept
 
 
 def pytest_terminal_summary(terminalreporter):

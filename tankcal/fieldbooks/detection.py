@@ -41,7 +41,7 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
     custom     gsi.Custom: what code blocks of GSI mean
     """
     text = _text(file, data, log)
-    if text is None or has_too_many_lines(file, text, log, MAX_LINES):
+    if text is None:
         return None
     found = wanted or _format_of(text, described)
     if found is None:
@@ -59,6 +59,8 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
             return jobxml.read(data.strip(_AROUND_BYTES + b"\r\n\t "), file, log)
         # An editor that writes UTF-16 leaves encoding="UTF-8" in the declaration.
         return jobxml.read(text.strip().encode(errors="replace"), file, log, "utf-8")
+    if has_too_many_lines(file, text, log, MAX_LINES):  # JobXML has many lines for each reading
+        return None
     for row, line in enumerate(text.split("\n"), 1):
         if len(line) > MAX_LINE and not (found == "gsi" and gsi.LINE.match(line)):
             expected = message("line_too_long", "a line of more than {most} characters; expected a"

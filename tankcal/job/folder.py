@@ -449,7 +449,7 @@ def read_csv(file, data, separator, decimal, log, settings_file=SETTINGS_FILE):
 def has_too_many_lines(file, text, log, most=MAX_LINES):
     """Whether a text has more lines than a table may have, after telling `log` so.
 
-    Asked before anything is made of the lines.
+    A caller asks this before it splits the text.
     """
     count = max(text.count("\n"), text.count("\r")) + (not text.endswith(("\n", "\r")))
     if count > most:

@@ -388,7 +388,7 @@ def _headings(file, cells, number, log):
 
 
 def too_many_columns(count):
-    """What is said of a row of so many cells."""
+    """Message about a row of so many cells."""
     return message(
         "too_many_columns", "{count} cells; expected at most {most}", count=count, most=MAX_COLUMNS
     )

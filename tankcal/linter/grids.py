@@ -2,11 +2,10 @@
 
 import csv
 import json
-import re
 from dataclasses import dataclass
 
 from tankcal.job.excel import Unreadable, read_sheets
-from tankcal.job.folder import decode, has_too_many_lines
+from tankcal.job.folder import decode, has_too_many_lines, is_row, split_lines
 from tankcal.job.sheets import is_read
 from tankcal.job.tables import MAX_COLUMNS, read_bytes, shown, too_many_columns
 from tankcal.linter.pdf_grids import tables_of_text
@@ -132,11 +131,7 @@ def _record(file, text, log):
 def _csv(file, text, log):
     if has_too_many_lines(file, text, log, MOST_LINES):
         return ()
-    lines = [
-        (number, line)
-        for number, line in enumerate(re.split("\r\n|\r|\n", text), 1)
-        if line.strip() and not line.lstrip(' \t"').startswith("#")
-    ]
+    lines = [(number, line) for number, line in enumerate(split_lines(text), 1) if is_row(line)]
     if not lines:
         log.problem(file, message("lint_empty", "empty; expected a table of heights and volumes"))
         return ()
@@ -158,6 +153,6 @@ def _csv(file, text, log):
             continue
         if len(cells) > MAX_COLUMNS:
             log.problem(file, too_many_columns(len(cells)), number)
-        elif any(cell.strip() for cell in cells):
+        elif any(cells):
             rows.append((number, tuple(cells)))
     return (Grid(file, tuple(rows), True),)

@@ -102,7 +102,7 @@ def _answer(path):
 
 
 def _is_short(pages):
-    """Whether the pages draw at most MOST_CONTENT: told before any of them is laid out."""
+    """Whether the pages draw at most MOST_CONTENT; counting it is quick, the layout is slow."""
     size = 0
     for page in pages:
         content = page.get_contents()

@@ -1,6 +1,7 @@
 """Figures in running text, which no session prints: each is the rounded result of a run."""
 
 import csv
+import math
 import re
 import shutil
 
@@ -10,6 +11,7 @@ from job_builder import write_folder
 from radii_jobs import HEIGHTS_M, RADII_M, radii_parts
 
 import tankcal
+from tankcal.cli import main
 
 pytestmark = pytest.mark.slow
 
@@ -28,7 +30,7 @@ def rounded(values, like):
 
 
 def test_a_point_that_is_kept(tmp_path):
-    said = figures_of(
+    printed = figures_of(
         "docs/overruling.md",
         "(U = () m³ of () m³) keeping `I 57`, which is () mm inside the wall, takes () m³ off the "
         "volume and makes U () m³",
@@ -41,19 +43,17 @@ def test_a_point_that_is_kept(tmp_path):
     [one] = result.overrulings.each
     top = plain.capacity.height_m.iloc[-1]
     found = [plain.at(top).U_m3, plain.at(top).value_m3, -1000 * one.off_m, -one.moved_m3]
-    assert rounded([*found, result.at(top).U_m3], said) == said
+    assert rounded([*found, result.at(top).U_m3], printed) == printed
 
 
 def test_a_sounding_of_a_ship(tmp_path):
-    said = figures_of(
+    printed = figures_of(
         "examples/ship/README.md",
         "At a trim of () m by the stern and a list of ()° to starboard a sounding of () m has "
         "a correction of −() mm, and the tank holds () m³, U = () m³; the table alone would say "
         "() m³",
     )
-    trim, heel, sounding = map(float, said[:3])
-    from tankcal.cli import main
-
+    trim, heel, sounding = map(float, printed[:3])
     assert main(["run", str(EXAMPLE.parent / "ship"), "--no-papers", "--out", str(tmp_path)]) == 0
     with open(tmp_path / "ship_corrections.csv") as lines:
         [row] = [
@@ -65,11 +65,11 @@ def test_a_sounding_of_a_ship(tmp_path):
     with open(tmp_path / "capacity.csv") as lines:
         [level] = [row for row in csv.DictReader(lines) if float(row["height_m"]) == sounding]
     found = [-float(row["correction_mm"]), float(row["volume_m3"]), float(row["U_m3"])]
-    assert rounded([*found, float(level["volume_m3"])], said[3:]) == said[3:]
+    assert rounded([*found, float(level["volume_m3"])], printed[3:]) == printed[3:]
 
 
 def test_rows_of_a_table_by_its_radii(tmp_path):
-    said = figures_of(
+    printed = figures_of(
         "docs/partial.md",
         "A row in the middle of the first course of a tank of () m, radii known to () mm, has U = "
         "() m³ of which () m³ are the radii; the row at its joint has () m³, all of it radii",
@@ -78,7 +78,7 @@ def test_rows_of_a_table_by_its_radii(tmp_path):
     joint = float(HEIGHTS_M[0])
     middle, at_joint = result.at(joint / 2), result.at(joint)
     radius, u = RADII_M[0], (0.7**2 + 0.3**2) ** 0.5
-    of_radii = middle.k * 2e-3 * 3.14159 * radius * joint / 2 * u  # U of a cylinder by its radius
+    of_radii = middle.k * 2e-3 * math.pi * radius * joint / 2 * u  # U of a cylinder by its radius
     found = [2 * radius, u, middle.U_m3, of_radii, at_joint.U_m3]
-    assert rounded(found, said) == said
+    assert rounded(found, printed) == printed
     assert at_joint.U_m3 == pytest.approx(2 * of_radii, rel=0.02)

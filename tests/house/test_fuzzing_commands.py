@@ -75,7 +75,7 @@ def hunt(bases, seeds_of, folder):
 
 
 def seeds_from(start, count):
-    """What gives the seeds of a base: fewer of those that take long."""
+    """Function of a name of a base that gives its seeds, a tenth as many for a slow one."""
     return lambda name: range(start, start + (-(-count // 10) if name in DEAR else count))
 
 

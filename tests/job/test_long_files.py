@@ -5,6 +5,8 @@ import shutil
 import pypdf
 import pytest
 from conftest import EXAMPLE
+from simulated_fieldbooks import two_stands
+from written_fieldbooks import WRITERS
 
 from tankcal import load
 from tankcal.errors import InputError
@@ -23,7 +25,7 @@ def unread(monkeypatch):
         raise AssertionError("lines were made of a text that has too many")
 
     monkeypatch.setattr(folder, "split_lines", split)
-    monkeypatch.setattr(grids.re, "split", lambda _pattern, text: split(text))
+    monkeypatch.setattr(grids, "split_lines", split)
 
 
 def refusal(read):
@@ -67,6 +69,14 @@ def test_a_field_book():
     line = b"110001+00000001 21.102+00000000 22.102+09000000 31..00+00010000\n"
     assert read_book("a.gsi", line * 100_001, log) is None
     assert [str(one) for one in log.problems] == ["a.gsi: 100001 lines; expected at most 100000"]
+
+
+def test_jobxml_has_many_lines_for_each_reading():
+    log = Log()
+    text = WRITERS["jxl"](two_stands(hits=4)).replace("\n", "\n" * 100_001, 1)
+    book = read_book("a.jxl", text.encode(), log)
+    assert log.problems == []
+    assert book.format == "jxl"
 
 
 @pytest.mark.slow
