@@ -20,6 +20,7 @@ import time
 import traceback
 from dataclasses import dataclass, field, replace
 from functools import cache
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 from unittest.mock import patch
@@ -32,6 +33,7 @@ from job_builder import job_parts, write_book, write_folder
 from simulated_fieldbooks import base_job, two_stands
 from tables_of_others import AREA_M2
 from written_fieldbooks import PROFILE, WRITERS
+from written_pdfs import write_pdf
 
 from tankcal import cli
 
@@ -425,6 +427,8 @@ def _make_tables(folder):
     read = ("read-table", "{in}/former.toml", "--courses", "{in}/courses.csv")
     return {
         "lint": Base(lint, {"table.csv": narrow.encode()}, complains=False),
+        "lint PDF": Base(("lint", "{in}/table.pdf"), {"table.pdf": _pdf(folder, rows)},
+                         complains=False),
         "lint wide": Base((*lint, "--json"), {"table.csv": wide.encode()}, complains=False),
         "lint workbook": Base(("lint", "{in}/table.xlsx"), {"table.xlsx": _book(folder, rows)},
                               complains=False),
@@ -444,6 +448,14 @@ def _book(folder, rows):
         for number, row in enumerate(rows, 1):
             sheet.write_row(number, 0, row)
     return path.read_bytes()
+
+
+def _pdf(folder, rows):
+    words = [(50, 790, "height_m"), (150, 790, "volume_m3")]
+    for number, (height, volume) in enumerate(rows):
+        y = 778 - 12 * number
+        words += [(50, y, f"{height:.2f}"), (150, y, f"{volume:.4f}")]
+    return write_pdf([words], folder / "table.pdf").read_bytes()
 
 
 def _make_imports(folder):
@@ -509,6 +521,8 @@ def _make_cameras(_):
                                  photos | {"others.toml": photos["cameras.toml"]},
                                  statuses=(0, 2, 3), complains=False),
     }  # fmt: skip
+    if find_spec("cv2") is not None:
+        found |= _camera_readings()
     for name, text in CONVERTED.items():
         to = "opencv" if name == "metashape" else "cameras.toml"
         found[f"camera convert {name}"] = Base(
@@ -516,6 +530,32 @@ def _make_cameras(_):
             {"camera.txt": text.encode()},
         )
     return found
+
+
+def _camera_readings():
+    """Bases that read two targets in a photograph; they need OpenCV."""
+    import cv2
+    import numpy as np
+
+    codes = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100)
+    image = np.full((160, 320), 220, np.uint8)
+    for number, left in ((7, 30), (9, 180)):
+        image[30:128, left : left + 98] = cv2.aruco.generateImageMarker(codes, number, 98)
+    discs = np.full((160, 320), 40, np.uint8)
+    for left in (80, 240):
+        cv2.circle(discs, (left, 80), 15, 230, -1, cv2.LINE_AA)
+    photo, circles = (
+        cv2.imencode(".png", cv2.GaussianBlur(one, (5, 5), 1.0))[1].tobytes()
+        for one in (image, discs)
+    )
+    read = ("camera", "read", "{in}/photo.png", "--quiet", "--out", "{out}/image_points.csv")
+    places = b"photo,point,column_px,line_px\nphoto,A,81,79\nphoto,B,241,82\n"
+    return {
+        "camera read": Base((*read, "--names", "{in}/names.csv"),
+                            {"photo.png": photo, "names.csv": b"id,point\n7,T7\n9,T9\n"}),
+        "camera read circles": Base((*read, "--what", "circles", "--places", "{in}/places.csv"),
+                                    {"photo.png": circles, "places.csv": places}),
+    }  # fmt: skip
 
 
 def _make_answers(folder):
@@ -528,6 +568,8 @@ def _make_answers(folder):
     return {
         "score": Base((*score, "--quiet"), files, exact=("truth.json",)),
         "score json": Base((*score, "--json"), files, exact=("truth.json",), complains=False),
+        "answer": Base(("intercomparison", "answer", "{in}/package", "--quiet", "--out", "{out}"),
+                       whole, exact=tuple(whole)),
         "template": Base(("intercomparison", "template", "{in}/package", "--out", "{out}"),
                          whole, ("package/manifest.json",), tuple(whole)),
     }  # fmt: skip
@@ -591,7 +633,7 @@ def _codes_in(outcome):
 
 
 def _content_of(data, place):
-    text = data.decode(errors="replace").replace(str(place), "")
+    text = data.decode(json.detect_encoding(data), errors="replace").replace(str(place), "")
     try:
         return _without_names(json.loads(text))
     except ValueError:

@@ -244,7 +244,7 @@ def add_odd_file(files, rng):
 
 
 def _lines_of(data):
-    return data.decode().split("\n")
+    return data.decode().replace("\r\n", "\n").split("\n")
 
 
 def _of_text(change):
@@ -303,9 +303,11 @@ def _quote_cells(name, data):
 
 
 def _add_comments(name, data):
+    """Comments below a table, which move no row that a name or a message refers to."""
     if not name.endswith((".csv", ".toml")):
         return None
-    return b"# a comment; with, marks = 1\n" + data.rstrip(b"\n") + b"\n# the end\n"
+    above = b"" if name.endswith(".csv") else b"# a comment; with, marks = 1\n"
+    return above + data.rstrip(b"\r\n") + b"\n# the end; with, marks = 1\n"
 
 
 NEUTRAL = {

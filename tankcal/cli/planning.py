@@ -38,6 +38,11 @@ def add(commands):
         help="write prediction, field sheets and an empty job there, all or nothing",
     )
     plan.add_argument(
+        "--workbook",
+        action="store_true",
+        help="write the empty job as one Excel workbook in place of text files",
+    )
+    plan.add_argument(
         "--changes",
         action="store_true",
         help="try every change of one item: what helps most, what can be spared",
@@ -101,6 +106,7 @@ def _plan(options):
         written = planning_papers.write(
             prediction, options.out, show.step,
             effects=effects, design=path, simulated=simulated, language=options.language,
+            workbook=options.workbook,
         )  # fmt: skip
     show.end()
     warn(prediction.warnings)
@@ -116,16 +122,19 @@ def _plan(options):
 def _refuse_idle(options):
     from tankcal.errors import InputError, Problem
 
+    problems = []
     if options.blunders and options.simulate is None:
-        raise InputError(
-            Problem(
-                "--blunders",
-                message(
-                    "plan_nothing_simulated",
-                    "nothing would be simulated; expected --simulate N as well",
-                ),
-            )
+        expected = message(
+            "plan_nothing_simulated", "nothing would be simulated; expected --simulate N as well"
         )
+        problems.append(Problem("--blunders", expected))
+    if options.workbook and options.out is None:
+        expected = message(
+            "plan_nothing_written", "nothing would be written; expected --out DIR as well"
+        )
+        problems.append(Problem("--workbook", expected))
+    if problems:
+        raise InputError(problems)
 
 
 def _refuse_simulation(plan, options):

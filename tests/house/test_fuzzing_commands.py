@@ -6,7 +6,8 @@
 2. Neutral changes (byte order mark, line ends, separators, encodings, quotation marks, comments):
    exit status and numbers are those of the unchanged input.
 
-`new`, `demo`, `docs`, `completion`, `notebook` and `app` read no data files of a user.
+`new`, `demo`, `docs`, `completion` and `intercomparison make` read no data files of a user;
+`notebook` and `app` start a server.
 """
 
 import os
@@ -96,11 +97,13 @@ def test_very_many_spoilt_files_of_every_command(bases, tmp_path):
     assert_no_faults(hunt(bases, seeds_from(start, draws(10, 4000)), tmp_path))
 
 
-BINARY = (".xlsx", ".npz", ".ply", ".off")
+BINARY = (".xlsx", ".npz", ".ply", ".off", ".pdf", ".png")
 NOT_NEUTRAL = {  # (beginning of a base, kind): why the change is none that a user may make
     ("import csv", "tabs"): "profile.toml declares the separator",
     ("import csv", "tabs and decimal commas"): "profile.toml declares the separator",
 }
+MARKS = {"tabs", "semicolons"}  # beside these 1.592 alone in a file may be 1592, and is refused
+AMBIGUOUS = "expected a decimal mark that is known"
 
 
 def change_neutrally(base, kind):
@@ -123,7 +126,8 @@ def compare_neutral(name, base, kinds, place):
             continue
         outcome = call(replace(base, earlier={}), files, place)
         found += [f"{name}, {kind}: {one}" for one in list_faults(base, outcome)]
-        if numbers_of(outcome) != usual:
+        is_refused = MARKS & {*kind.split()} and AMBIGUOUS in outcome.err
+        if numbers_of(outcome) != usual and not is_refused:
             found.append(f"{name}, {kind}: other numbers; {outcome.err.strip()[:300]}")
     return found
 

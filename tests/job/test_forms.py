@@ -36,6 +36,8 @@ def plain_terminal(monkeypatch):
 def both(tmp_path):
     """A folder as older versions wrote it: text files and workbook, nothing filled in."""
     write_form(tmp_path / "job", Form("vertical"))
+    write_input_workbook(tmp_path / "job.xlsx")
+    (tmp_path / "job.xlsx").rename(tmp_path / "job" / "job.xlsx")
     return tmp_path / "job"
 
 
@@ -129,7 +131,7 @@ def test_two_blank_forms_are_told_once_and_as_text(both):
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_form_filled_in_another_language_is_recognised(tmp_path, language):
     """Words of choices and flags of the form do not count as typed."""
-    write_form(tmp_path / "job", Form("horizontal", None, language))
+    write_form(tmp_path / "job", Form("horizontal", None, language), workbook=True)
     book = openpyxl.load_workbook(tmp_path / "job" / "job.xlsx")
     place_of(book["job"], "tank.id").value = "TQ-7"
     book.save(tmp_path / "job" / "job.xlsx")

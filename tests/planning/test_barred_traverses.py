@@ -43,7 +43,8 @@ def test_the_empty_job_filled_in_is_the_plan(prediction, tmp_path):
 
 def test_rows_of_the_workbook(prediction, tmp_path):
     """Two angles from each of eight stations, without a value, in the language's own sheet."""
-    wall_files.write_empty_job(prediction, tmp_path / "job")
+    wall_files.write_empty_job(prediction, tmp_path / "job", workbook=True)
+    assert [one.name for one in (tmp_path / "job").iterdir()] == ["job.xlsx"]
     sheet = openpyxl.load_workbook(tmp_path / "job" / "job.xlsx")["stadia"]
     rows = [[cell.value for cell in row][1:3] for row in sheet.iter_rows()]
     assert sum(row in (["1", "S2"], ["2", "S1"]) for row in rows) == 2

@@ -96,12 +96,12 @@ def test_empty_job_has_what_is_known(planned):
 @pytest.mark.parametrize("fill", ["folder", "workbook"])
 def test_the_filled_job_is_the_survey_that_was_planned(empty, fill):
     """Second method: read, adjusted and computed as a job, from readings without errors."""
-    prediction, folder = empty
-    path = folder
+    prediction, path = empty
     if fill == "folder":
-        fill_folder(folder, exact(prediction))
+        fill_folder(path, exact(prediction))
     else:
-        path = folder / "job.xlsx"
+        empty_job.write(prediction, path.parent / "book", workbook=True)
+        path = path.parent / "book" / "job.xlsx"
         fill_workbook(path, exact(prediction))
     result = tankcal.run(load(path), simulated=False)
     assert result.adjustment.sigma0 < 1e-6
@@ -123,9 +123,11 @@ def test_the_filled_job_is_the_survey_that_was_planned(empty, fill):
 @pytest.mark.slow
 def test_both_forms_filled_in_are_the_same_job(empty):
     prediction, folder = empty
-    fill_workbook(folder / "job.xlsx", exact(prediction))
+    empty_job.write(prediction, folder.parent / "book", workbook=True)
+    book = folder.parent / "book" / "job.xlsx"
+    fill_workbook(book, exact(prediction))
     fill_folder(folder, exact(prediction))
-    assert_same_job(load(folder), load(folder / "job.xlsx"))
+    assert_same_job(load(folder), load(book))
 
 
 @pytest.mark.slow
@@ -203,8 +205,10 @@ def test_a_fixed_photo_keeps_its_place(tmp_path):
 @pytest.mark.slow
 def test_a_filled_job_is_never_replaced(tmp_path, capsys):
     out = tmp_path / "out"
+    assert main(["plan", str(PLAN), "--quiet", "--out", str(out), "--workbook"]) == 0
+    assert [one.name for one in (out / "job").iterdir()] == ["job.xlsx"]
     assert main(["plan", str(PLAN), "--quiet", "--out", str(out)]) == 0
-    assert main(["plan", str(PLAN), "--quiet", "--out", str(out)]) == 0
+    assert not (out / "job" / "job.xlsx").exists()  # one form
     with open(out / "job" / "distances.csv", "a", encoding="utf-8") as file:
         file.write("# read by me\n")
     capsys.readouterr()

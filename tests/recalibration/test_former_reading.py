@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import openpyxl
 import pytest
+from written_pdfs import write_pdf
 
 from tankcal.errors import InputError
 from tankcal.recalibration.reading import read_former
@@ -59,32 +60,6 @@ def workbook(path):
     return path
 
 
-def pdf_of(pages, path):
-    """A PDF with words (x, y, text) on each page, written by hand."""
-    parts = ["<< /Type /Catalog /Pages 2 0 R >>", None]
-    parts.append("<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica >>")
-    kids = []
-    for words in pages:
-        stream = "".join(f"BT /F 8 Tf 1 0 0 1 {x} {y} Tm ({t}) Tj ET\n" for x, y, t in words)
-        parts.append(f"<< /Length {len(stream)} >>\nstream\n{stream}endstream")
-        kids.append(len(parts) + 1)
-        parts.append(
-            f"<< /Type /Page /Parent 2 0 R /MediaBox [0 0 595 842] /Contents {len(parts)} 0 R "
-            "/Resources << /Font << /F 3 0 R >> >> >>"
-        )
-    listed = " ".join(f"{kid} 0 R" for kid in kids)
-    parts[1] = f"<< /Type /Pages /Kids [{listed}] /Count {len(kids)} >>"
-    data, places = "%PDF-1.4\n", []
-    for number, part in enumerate(parts, 1):
-        places.append(len(data))
-        data += f"{number} 0 obj\n{part}\nendobj\n"
-    rows = "".join(f"{place:010d} 00000 n \n" for place in places)
-    data += f"xref\n0 {len(parts) + 1}\n0000000000 65535 f \n{rows}"
-    data += f"trailer << /Size {len(parts) + 1} /Root 1 0 R >>\nstartxref\n"
-    path.write_bytes((data + f"{data.index('xref')}\n%%EOF\n").encode("latin-1"))
-    return path
-
-
 def pdf(path):
     """Three pairs of columns a page, the last page shorter; prose, and numbers of pages."""
     rows = [(f"{100 * h:.0f}", f"{1000 * v:.0f}") for h, v in zip(HEIGHT, VOLUME, strict=True)]
@@ -100,7 +75,7 @@ def pdf(path):
             for k, (height, volume) in enumerate(part):
                 words += [(left, 745 - 11 * k, height), (left + 70, 745 - 11 * k, volume)]
         pages.append(words)
-    return pdf_of(pages, path.with_suffix(".pdf"))
+    return write_pdf(pages, path.with_suffix(".pdf"))
 
 
 MADE = [plain, in_litres, ullages, workbook]
@@ -134,7 +109,7 @@ def test_feet_inches_and_sixteenths(kind, tmp_path):
         words = [(50, 770, "Gauge ft-in-16"), (200, 770, "Volume, bbl")]
         for k, row in enumerate(rows[:60]):
             words += [(50, 755 - 11 * k, row[0]), (200, 755 - 11 * k, row[1])]
-        path, rows = pdf_of([words], path.with_suffix(".pdf")), rows[:60]
+        path, rows = write_pdf([words], path.with_suffix(".pdf")), rows[:60]
     else:
         write(path, "Gauge ft-in-16,bbl", rows)
     former = read_former(path)
@@ -358,5 +333,5 @@ def test_spoilt_files_are_read_or_refused(tmp_path):
 
 @pytest.mark.slow
 def test_a_scanned_pdf_is_one_line(tmp_path):
-    (line,) = refusal(pdf_of([[]], tmp_path / "old.pdf"))
+    (line,) = refusal(write_pdf([[]], tmp_path / "old.pdf"))
     assert "is it a scan?" in line

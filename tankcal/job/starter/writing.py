@@ -186,13 +186,18 @@ def write_starter(directory, kind="vertical", survey=None, language=DEFAULT):
         raise _unwritten(directory, error) from error
 
 
-def write_form(directory, form):
-    """Write the job of a Form into `directory`, text files and workbook; InputError as above."""
+def write_form(directory, form, workbook=False):
+    """Write the job of a Form into `directory`; InputError as above.
+
+    workbook  write it as job.xlsx in place of text files
+    """
     directory = Path(directory)
     try:
         _make_empty(directory)
-        _write_texts(directory, form)
-        (directory / WORKBOOK_FILE).write_bytes(book_bytes(form))
+        if workbook:
+            (directory / WORKBOOK_FILE).write_bytes(book_bytes(form))
+        else:
+            _write_texts(directory, form)
     except OSError as error:
         raise _unwritten(directory, error) from error
 

@@ -24,7 +24,15 @@ FILES = (
 
 
 def write(
-    prediction, directory, progress=None, *, effects=(), design=None, simulated=None, language=None
+    prediction,
+    directory,
+    progress=None,
+    *,
+    effects=(),
+    design=None,
+    simulated=None,
+    language=None,
+    workbook=False,
 ):
     """Write everything that a `planning.predicting.Prediction` gives, all or nothing; the paths.
 
@@ -35,6 +43,7 @@ def write(
                None: none was looked for
     simulated  `planning.simulations.Simulated` of the prediction, or None
     language   of papers and workbook, one of languages.LANGUAGES; None: that of the plan
+    workbook   write the empty job as job.xlsx in place of text files
 
     Raises InputError for a folder that holds other things, or an empty job that was filled in.
     """
@@ -43,10 +52,11 @@ def write(
     with folders.replaced(directory, language) as temporary:
         kind = _paper_of(prediction)
         paper = kind(prediction, language, effects, design, simulated)
-        _write(paper, temporary, progress)
+        _write(paper, temporary, progress, workbook)
         if design is not None and design.steps:
             (temporary / DESIGN).mkdir()
-            _write(kind(design.prediction, language), temporary / DESIGN, progress)
+            designed = kind(design.prediction, language)
+            _write(designed, temporary / DESIGN, progress, workbook)
         _refuse_filled(directory)  # meanwhile
     names = (*FILES, JOB, DESIGN)
     return [path for path in (Path(directory) / name for name in names) if path.exists()]
@@ -59,30 +69,30 @@ def _paper_of(prediction):
     return WallPaper if isinstance(prediction, WallPrediction) else PlanPaper
 
 
-def _write(paper, folder, progress):
+def _write(paper, folder, progress, as_workbook):
     """The files of a PlanPaper."""
     if paper.is_wall:
-        _write_wall(paper, folder, progress)
+        _write_wall(paper, folder, progress, as_workbook)
         return
     from tankcal.report.planning import empty_job, files, workbook
     from tankcal.report.planning.field_sheets import sheets
     from tankcal.report.planning.outlook import outlook
 
     progress(WRITING_JOB)
-    empty_job.write(paper.prediction, folder / JOB)
+    empty_job.write(paper.prediction, folder / JOB, as_workbook)
     progress(WRITING_TABLES)
     files.write(paper, folder, empty_job.fingerprints(folder / JOB))
     workbook.write(paper, folder / "field-sheets.xlsx")
     _set(paper, folder, progress, outlook(paper), sheets(paper))
 
 
-def _write_wall(paper, folder, progress):
+def _write_wall(paper, folder, progress, as_workbook):
     """The files of a WallPaper."""
     from tankcal.report.planning import empty_job, wall_files, workbook
     from tankcal.report.planning.wall_paper import wall_outlook, wall_sheets
 
     progress(WRITING_JOB)
-    wall_files.write_empty_job(paper.prediction, folder / JOB)
+    wall_files.write_empty_job(paper.prediction, folder / JOB, as_workbook)
     progress(WRITING_TABLES)
     wall_files.write_wall(paper, folder, empty_job.fingerprints(folder / JOB))
     workbook.write_of_wall(paper, folder / "field-sheets.xlsx")

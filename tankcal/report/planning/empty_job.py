@@ -26,9 +26,9 @@ AS_GIVEN = ("courses", "welds", "bottom", "deadwood", "uncertainty", "correlatio
 SIGHTS = {"directions": "direction", "zenith_angles": "zenith", "slope_distances": "distance"}
 
 
-def write(prediction, directory):
-    """Write the empty job of a Prediction into a folder that is made, text files and job.xlsx."""
-    write_form(directory, form_of(prediction))
+def write(prediction, directory, workbook=False):
+    """Write the empty job of a Prediction into a new folder, as text files or as job.xlsx."""
+    write_form(directory, form_of(prediction), workbook)
 
 
 def fingerprints(folder):

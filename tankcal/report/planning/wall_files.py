@@ -26,9 +26,9 @@ def write_wall(paper, folder, fingerprints):
     write_effects(paper, folder)
 
 
-def write_empty_job(prediction, directory):
-    """Write the empty job of a WallPrediction into a folder that is made, text and job.xlsx."""
-    write_form(directory, form_of_wall(prediction.plan))
+def write_empty_job(prediction, directory, workbook=False):
+    """Write the empty job of a WallPrediction into a new folder, as text files or as job.xlsx."""
+    write_form(directory, form_of_wall(prediction.plan), workbook)
 
 
 def form_of_wall(plan):

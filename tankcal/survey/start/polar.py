@@ -231,14 +231,14 @@ def free_station(targets, readings, lengths, controlled=False):
     readings  (n,) rad on a circle with unknown zero      lengths  (n,) m, nan where not measured
     """
     few = _few(len(targets))
-    poses = [_from_three(targets[[i, j, k]], readings[[i, j, k]])
-             for i, j, k in combinations(few, 3)]  # fmt: skip
+    triples = np.array(list(combinations(few, 3)), dtype=int).reshape(-1, 3)
+    poses = [_poses_from_three(targets[triples], readings[triples])]
     taped = [i for i in few if np.isfinite(lengths[i])]
     poses += [_from_two(targets[[i, j]], readings[[i, j]], lengths[[i, j]])
               for i, j in combinations(taped, 2)]  # fmt: skip
     poses += [_from_angle(targets[[i, j]], readings[[i, j]], lengths[i])
               for i in taped for j in few if not np.isfinite(lengths[j])]  # fmt: skip
-    poses = np.concatenate([np.zeros((0, 3)), *poses])
+    poses = np.concatenate(poses)
     poses = poses[np.isfinite(poses).all(axis=1)]
     if not len(poses):
         return None
@@ -250,30 +250,32 @@ def free_station(targets, readings, lengths, controlled=False):
     return None if found is None else found[:2]
 
 
-def _from_three(targets, readings):
-    """Pose (0 or 1, 3) x, y, zero from directions to three targets.
+def _poses_from_three(targets, readings):
+    """Poses (k, 3) x, y, zero from directions (t, 3) to the triples of targets (t, 3, 2).
 
     With a, b = cos, sin of the zero, P = x a - y b and Q = x b + y a each direction is linear:
-    a (X cos - Y sin) - b (X sin + Y cos) - P cos + Q sin = 0.
+    a (X cos - Y sin) - b (X sin + Y cos) - P cos + Q sin = 0. A triple gives no pose where the
+    station lies on a circle with its targets.
     """
     s, c = np.sin(readings), np.cos(readings)
-    middle = targets.mean(axis=0)
-    x, y = (targets - middle).T
-    size = max(np.abs(x).max(), np.abs(y).max(), 1e-9)
-    rows = np.column_stack([(x * c - y * s) / size, -(x * s + y * c) / size, -c, s])
+    middle = targets.mean(axis=1)
+    x, y = np.moveaxis(targets - middle[:, None], -1, 0)
+    # coordinates in units of the triple's size, so that all columns have a size of about 1
+    size = np.maximum(np.maximum(np.abs(x), np.abs(y)).max(axis=1), 1e-9)[:, None]
+    rows = np.stack([(x * c - y * s) / size, -(x * s + y * c) / size, -c, s], axis=-1)
     _, singular, v = np.linalg.svd(rows)
-    if singular[2] < 1e-4 * singular[0]:
-        return np.zeros((0, 3))  # the station lies on a circle with the targets
-    a, b, p, q = v[3]
+    a, b, p, q = v[:, 3].T
     square = a * a + b * b
-    if square < 1e-12:
-        return np.zeros((0, 3))
-    xy = size * np.array([p * a + q * b, q * a - p * b]) / square
+    kept = (singular[:, 2] >= 1e-4 * singular[:, 0]) & (square >= 1e-12)
+    a, b, p, q, square = a[kept], b[kept], p[kept], q[kept], square[kept]
+    xy = size[kept] * np.stack([p * a + q * b, q * a - p * b], axis=-1) / square[:, None]
     zero = np.arctan2(b, a)
-    ahead = np.column_stack([np.sin(readings + zero), np.cos(readings + zero)])
-    if np.sum((targets - middle - xy) * ahead) < 0:
-        zero += np.pi
-    return np.array([[*(xy + middle), zero]])
+    # a and b may both have the wrong sign: then the targets are behind the telescope
+    turned = readings[kept] + zero[:, None]
+    ahead = np.stack([np.sin(turned), np.cos(turned)], axis=-1)
+    offsets = targets[kept] - middle[kept, None] - xy[:, None]
+    zero[np.sum(offsets * ahead, axis=(1, 2)) < 0] += np.pi
+    return np.column_stack([xy + middle[kept], zero])
 
 
 def _from_two(targets, readings, lengths):
