@@ -5,6 +5,7 @@ No text of a user is ever read as markup, for typst sees it only as strings of t
 
 import base64
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from threading import Lock
 
 from tankcal.errors import TankcalError
 from tankcal.memory import return_freed_memory
+from tankcal.messages import printable
 from tankcal.report import attachments
 from tankcal.report.blocks import WEB_ONLY
 from tankcal.report.page_tables import prepared
@@ -42,6 +44,8 @@ try:
 except TankcalError as error:
     (folder / "refused.txt").write_text(str(error), encoding="utf-8")
 """
+# an escaped backslash, which is kept, or a control character as JSON writes it
+_CONTROL_IN_JSON = re.compile(r"(\\\\)|\\u00[01][0-9a-f]|\\[bf]|[\x7f-\x9f]")
 FONT_FILES = ("STIXGeneral*.ttf", "DejaVuSerif*.ttf", "DejaVuSans.ttf")
 
 
@@ -60,7 +64,7 @@ def pdf(blocks, folder=".", again=False, packed=None):
     attached = attachments.contents(blocks, folder)
     files, blocks = _pictures_as_files(blocks)
     files["main.typ"] = (shipped_folder("report_templates") / "page.typ").read_bytes()
-    files["blocks.json"] = json.dumps(blocks, ensure_ascii=False).encode("utf-8")
+    files["blocks.json"] = _spell_controls(json.dumps(blocks, ensure_ascii=False)).encode("utf-8")
     long = any("table" in block["kind"] and len(block["rows"]) > LONG for block in blocks)
     with _ALONE if long else nullcontext():
         made = _set(files, attached, _timestamp(blocks[0]["date"]), packed)
@@ -68,6 +72,17 @@ def pdf(blocks, folder=".", again=False, packed=None):
             _forget()
     field = next((block["field"] for block in blocks if block.get("field")), None)
     return with_signature_field(made, field) if field else made
+
+
+def _spell_controls(text):
+    """JSON in which control characters, which no font has, are spelt out as the text `\\x00`."""
+    return _CONTROL_IN_JSON.sub(_spell_control, text)
+
+
+def _spell_control(match):
+    if match[1]:
+        return match[0]
+    return json.dumps(printable(json.loads(f'"{match[0]}"')))[1:-1]
 
 
 def _set(files, attached, timestamp, packed):

@@ -1,5 +1,8 @@
-"""The typesetter in a process of its own, where the system limits the memory."""
+"""The typesetter: control characters, and a process of its own where memory is limited."""
 
+import io
+
+import pypdf
 import pytest
 
 from tankcal.errors import TankcalError
@@ -19,6 +22,15 @@ def test_the_other_process_makes_the_same_bytes_and_reports_the_same_error(monke
             module.pdf(BROKEN)
         found.append((module.pdf(PAGE), str(refused.value)))
     assert found[0] == found[1]
+
+
+@pytest.mark.slow
+def test_control_characters_are_spelt_out():
+    """No font has them, and PDF/UA admits no text without a glyph."""
+    text = "a\x00b \x08 \x7f \x85 \\u0000 \\\x01"
+    made = module.pdf([*PAGE, blocks.paragraph(text).data])
+    [page] = pypdf.PdfReader(io.BytesIO(made)).pages
+    assert r"a\x00b \x08 \x7f \x85 \u0000 \\x01" in page.extract_text()
 
 
 def test_a_process_that_ends_without_a_page_had_no_memory(monkeypatch):
