@@ -22,7 +22,13 @@ ROOT = Path(__file__).resolve().parent.parent
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^()\s]+)\)")
 MATH = re.compile(r"(?<![\\$])\$([^$\n]+)\$(?!\$)")
 RESULTS = ROOT / "build/benchmarks.json"
-PAGES = ("docs/*.md", "CHANGELOG.md", "CONTRIBUTING.md", "examples/*/README.md")
+PAGES = (
+    "docs/*.md",
+    "docs/journal/*.md",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    "examples/*/README.md",
+)
 DOORS = {  # rooms of the reference, in the order in which a job goes through them
     "tankcal": ("tankcal", "tankcal.errors"),
     "The core": ("tankcal.adjust", "tankcal.sections", "tankcal.quadrature", "tankcal.uncertainty"),

@@ -391,7 +391,7 @@ def _scatter(found):
     yield message(
         "plan_scatter",
         "{runs} simulated surveys, scatter over prediction: coordinates {ratio:.3f}, volume "
-        "{volume_ratio:.3f} (known to {ratio_sd:.2g}); {aside:.1f} values set aside on "
+        "{volume_ratio:.3f} (known to {ratio_sd:.2g}); {aside:.1f} values rejected on "
         "average, without a solution: {failed}",
         runs=found.runs,
         ratio=found.ratio,

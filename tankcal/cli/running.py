@@ -337,10 +337,10 @@ def _fit_of(adjustment):
 
 def _set_aside(count):
     if count == 0:
-        return message("none_set_aside", "no observations set aside")
+        return message("none_set_aside", "no observations rejected")
     if count == 1:
-        return message("one_set_aside", "1 observation set aside")
-    return message("some_set_aside", "{count} observations set aside", count=count)
+        return message("one_set_aside", "1 observation rejected")
+    return message("some_set_aside", "{count} observations rejected", count=count)
 
 
 def _points(count):

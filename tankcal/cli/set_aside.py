@@ -1,4 +1,4 @@
-"""What a run set aside, by name, in a few lines: points of the wall, what tape and reference lines
+"""What a run rejected, by name, in a few lines: points of the wall, what tape and reference lines
 read of it, readings of the survey.
 """
 
@@ -8,7 +8,7 @@ NAMED = 5  # of each kind
 
 
 def lines_set_aside(result, adjustment):
-    """A line (Message) for each kind of which something was set aside, the first names of it.
+    """A line (Message) for each kind of which something was rejected, the first names of it.
 
     result      Result of a job, None: only its survey was adjusted
     adjustment  NetworkAdjustment or None
@@ -36,7 +36,7 @@ class _Told:
 
 
 def _points(result):
-    what = message("set_aside_points", "points set aside")
+    what = message("set_aside_points", "points rejected")
     if result.accepted is None:
         return _Told(what)
     kept = {int(i) for i in result.accepted}
@@ -44,7 +44,7 @@ def _points(result):
 
 
 def _straps(result):
-    what, straps = message("set_aside_straps", "circumferences set aside"), result.straps
+    what, straps = message("set_aside_straps", "circumferences rejected"), result.straps
     if straps is None:
         return _Told(what)
     gone = straps.adjusted[~straps.accepted]
@@ -56,7 +56,7 @@ def _in_row(strap):
 
 
 def _offsets(result):
-    what, read = message("set_aside_offsets", "offsets set aside"), result.read
+    what, read = message("set_aside_offsets", "offsets rejected"), result.read
     if read is None or result.job.lines is None:
         return _Told(what)
     gone = read.places[read.are("offsets")][~read.tests_of("offsets")[2]]
@@ -70,7 +70,7 @@ def _at_level(offset):
 
 def _readings(adjustment):
     """Readings of the survey, the one that contradicts the others most first."""
-    what = message("set_aside_readings", "readings set aside")
+    what = message("set_aside_readings", "readings rejected")
     removed = () if adjustment is None else adjustment.removed
     worst = sorted(removed, key=lambda one: -abs(one.w))
     return _Told(what, (_of_file(one) for one in worst))

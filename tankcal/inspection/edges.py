@@ -25,7 +25,7 @@ from tankcal.record.inspection import EdgeProfile, InspectionLimit
 
 FAR_FROM_SHELL_M = 0.3  # of the last reading: from there to the shell the line is carried on
 WIDEST_EDGE, WIDEST_EDGE_M = 0.3, 3.0  # of the radius, and in all
-MOST_BULGES = 3  # of a profile that are set aside
+MOST_BULGES = 3  # of a profile that are rejected
 ZONE = 3.0  # times that: the readings that the bent line goes through
 BEYOND_SHELL = 1.02  # of the shell's radius: farther out is another unit, or another tank
 

@@ -65,7 +65,7 @@ def _of_targets(registration):
             text = message(
                 "target_removed",
                 "target {target!r} of scan {scan!r} is {off_mm:.1f} mm off where the others have it"
-                " (|w| = {w:.1f}): set aside",
+                " (|w| = {w:.1f}): rejected",
                 target=one.target,
                 scan=one.scan,
                 off_mm=1000 * float(np.linalg.norm(one.residual_m)),

@@ -1,4 +1,4 @@
-"""Warnings of reference lines: offsets that were set aside, lines that moved, too few of them."""
+"""Warnings of reference lines: offsets that were rejected, lines that moved, too few of them."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -25,7 +25,7 @@ SCALE_OF_MEDIAN = 1.4826
 WRITTEN_M = 5e-5  # half the last digit that is said of a difference
 CRITICAL_LEAN = 3.72  # of two slopes together: a chi-square of two exceeds it in 0.1 %
 VERTICALS = 1e-4  # m/m: how alike the verticals of a plummet and of the points are, 20"
-MANY, MANY_LINES = 0.15, 0.5  # of the offsets, and of the lines with one of them, set aside
+MANY, MANY_LINES = 0.15, 0.5  # of the offsets, and of the lines with one of them, rejected
 FEWEST_LEVELS, FEWEST_ALIKE = 5, 4  # to tell a level, or a copied line, from the others
 
 
@@ -168,7 +168,7 @@ def _set_aside(job, wall):
         text = message(
             "many_offsets_set_aside",
             "{count} of {all} offsets, on {lines} lines, depart from what all others show by more"
-            " than their standard deviations of {sd_mm:g} mm (median) allow, and were set aside: is"
+            " than their standard deviations of {sd_mm:g} mm (median) allow, and were rejected: is"
             " s_mm too small, or in another unit?",
             count=len(lost),
             all=len(read),
@@ -183,7 +183,7 @@ def _set_aside(job, wall):
             text = message(
                 "offset_set_aside",
                 "line {line!r} at {level_m:g} m: {away_mm:+.1f} mm of radius from what all others"
-                " show, w = {w:.1f}; it was set aside",
+                " show, w = {w:.1f}; it was rejected",
                 line=one.line,
                 level_m=one.level_m,
                 away_mm=1000 * by_m,

@@ -1,4 +1,4 @@
-"""Set-ups most of whose hits were set aside, and what would bring these to the wall.
+"""Set-ups most of whose hits were rejected, and what would bring these to the wall.
 
 A circle that counts anticlockwise or from another zero, hits under the name of another set-up: each
 is tried with the poses as they are, and told where the hits come to lie on the wall of all others.
@@ -12,14 +12,14 @@ from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
 from tankcal.survey.sighting import certified_m, rays
 
-MANY, MOST, FEWEST = 0.2, 0.5, 5  # of the hits of a set-up, set aside: with a cause, without; hits
+MANY, MOST, FEWEST = 0.2, 0.5, 5  # of the hits of a set-up, rejected: with a cause, without; hits
 OFF_M = 0.01  # from the wall, by which they are at least
 CLOSER = 0.2  # distance from the wall, of that as it is read, from which on a cause is told
 TURNS = 720  # zeros of a circle that are tried
 
 
 def check_lost_setups(job, wall, sighting):
-    """`Problem`s of set-ups most of whose hits were set aside."""
+    """`Problem`s of set-ups most of whose hits were rejected."""
     counted = np.flatnonzero(~job.hits.check)
     kept = wall.accepted[wall.accepted < len(counted)]  # targets come after the hits
     lost = np.ones(len(counted), dtype=bool)

@@ -190,7 +190,7 @@ def _changed(found, plain, decisions):
 
 
 def _removed(adjustment):
-    """Readings that were set aside, as an `Overruling` names them."""
+    """Readings that were rejected, as an `Overruling` names them."""
     return {f"{one.file.removesuffix('.csv')} {one.row}" for one in adjustment.removed}
 
 

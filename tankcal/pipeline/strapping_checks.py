@@ -129,7 +129,7 @@ def _of_contradicted(straps, together):
             text = message(
                 "strap_set_aside",
                 "circumference {name!r} of course {course!r} is {miss_mm:+.1f} mm from what the"
-                " points and all other straps show (w = {w:.1f}) and was set aside",
+                " points and all other straps show (w = {w:.1f}) and was rejected",
                 name=name,
                 course=course,
                 miss_mm=miss,

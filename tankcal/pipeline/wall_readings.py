@@ -228,7 +228,7 @@ def settle_readings(field, field_of, given, may_go):
     given : tuple
         Sites, (n,) radii and (n, n) noise of all.
     may_go : ndarray, shape (n,)
-        Which of them may be set aside.
+        Which of them may be rejected.
 
     Returns
     -------

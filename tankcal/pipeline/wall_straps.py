@@ -97,7 +97,7 @@ class Straps:
     adjusted : ndarray of int, shape (k,)
         Which of these are readings of the wall; the others are only compared.
     accepted : ndarray of bool, shape (k,)
-        False: set aside, for all others contradict it.
+        False: rejected, for all others contradict it.
     w : ndarray, shape (k,)
         Departure from what all others show over its sd; nan: no other controls it.
     sd_m : ndarray, shape (k,)

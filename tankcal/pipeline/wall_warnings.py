@@ -1,4 +1,4 @@
-"""Warnings of the wall that was found: its sections, how it was measured, what was set aside."""
+"""Warnings of the wall that was found: its sections, how it was measured, what was rejected."""
 
 from itertools import pairwise
 

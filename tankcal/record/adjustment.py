@@ -130,14 +130,14 @@ class AdjustmentRecord(Saved):
     cov_scale: float = key("factor of every covariance of the record: 1, or sigma0 squared")
     scale: str = key('"a_priori" or "a_posteriori"')
     snooping: bool = key("whether blunders were searched for")
-    critical_w: float = key("beyond which a reading is set aside")
+    critical_w: float = key("beyond which a reading is rejected")
     critical_tau: float | None = key("of tau")
     alpha: Finite = key("level of the tests of single readings")
     power: Finite = key("of these tests, for the mdb")
     datum: DatumReport = key("what holds the frame")
     groups: list[AdjustedGroup] = key("kinds of observations and instruments")
     held: list[HeldValue] = key("values that hold exactly: sd 0")
-    removed: list[AdjustedReading] = key("readings set aside, the worst first")
+    removed: list[AdjustedReading] = key("readings rejected, the worst first")
     residuals: Annotated[dict, Columns(AdjustedReading)] | None = key(
         "all readings, a list for each key; null: they are in the file of `long_tables`"
     )
@@ -203,7 +203,7 @@ def adjustment_of(adjustment, measurements=None):
 
 
 def _removed(readings):
-    """The `AdjustedReading` of each reading that was set aside."""
+    """The `AdjustedReading` of each reading that was rejected."""
     rows = zip(readings, _controlled(readings).tolist(), strict=True)
     return [AdjustedReading(**vars(one), controlled=controlled) for one, controlled in rows]
 

@@ -15,7 +15,7 @@ ARCSEC = np.degrees(1.0) * 3600
 
 
 class ReadingSetAside(Saved):
-    """A reading that was set aside in the reference, and is left out of all runs."""
+    """A reading that was rejected in the reference, and is left out of all runs."""
 
     kind: str = key("of observation")
     ids: list[str] = key("names")
@@ -29,7 +29,7 @@ class BlunderSearch(Saved):
     """The search in the reference; no run searches again, so that all have the same readings."""
 
     searched: bool = key("whether blunders were searched for")
-    removed: list[ReadingSetAside] = key("readings set aside")
+    removed: list[ReadingSetAside] = key("readings rejected")
 
 
 class Skipped(Saved):

@@ -74,7 +74,7 @@ class ScanTargetUsed(Saved):
     residual_m: list[float] = key("x, y, z: by the pose less adjusted, in the frame of the tank")
     w: float | None = key("of the worst of them; null: nothing checks it")
     mdb_m: float | None = key("smallest blunder that the test shows; null: none")
-    removed: bool = key("whether it was set aside")
+    removed: bool = key("whether it was rejected")
     row: int | None = key("of scan_targets.csv")
 
 

@@ -21,7 +21,7 @@ class OffsetReading(Saved):
     departure_m: float | None = key("outwards, from what all others show; null: only compared")
     w: float | None = key("that over its sd; null: only compared, or uncontrolled")
     mdb_m: float | None = key("smallest blunder that this test finds; null: as for w")
-    state: str = key('"used", "rejected" (set aside by w) or "check" (only compared)')
+    state: str = key('"used", "rejected" (by w) or "check" (only compared)')
     row: int | None = key("of the file")
 
 
@@ -33,7 +33,7 @@ class SightLine(Saved):
     plummet: str = key("name of its instrument")
     side: str = key('"outside" or "inside"')
     offsets: int = key("adjusted and not rejected")
-    rejected: int = key("offsets that were set aside")
+    rejected: int = key("offsets that were rejected")
 
 
 class LevelOfLines(Saved):

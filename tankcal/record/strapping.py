@@ -27,7 +27,7 @@ class StrapReading(Saved):
     difference_m: float = key("from the circumference of its course")
     w: float | None = key("departure from what all others show over its sd; null: uncontrolled")
     mdb_m: float | None = key("smallest blunder that this test finds; null: no other controls it")
-    used: bool = key("false: only compared, or set aside")
+    used: bool = key("false: only compared, or rejected")
     row: int | None = key("of the file")
 
 

@@ -307,7 +307,7 @@ class Adjustment:
         if self.redundancy > 0:
             test = "passed" if self.adjusted.test().passed else "FAILED"
             fit = f"sigma0 = {fixed(self.sigma0, 3)}, global test {test}"
-        aside = f", {len(self.removed)} readings set aside" if self.removed else ""
+        aside = f", {len(self.removed)} readings rejected" if self.removed else ""
         return f"{len(self.names)} points, redundancy {self.redundancy}, {fit}{aside}"
 
     def __repr__(self) -> str:

@@ -248,7 +248,7 @@ def scale_sentence(words, adjustment):
 
 
 def snooping_sentence(words, adjustment):
-    """How blunders were searched, and how many observations were set aside."""
+    """How blunders were searched, and how many observations were rejected."""
     if not adjustment["snooping"]:
         return words["texts"]["snooping_off"]
     removed = {(row["kind"], tuple(row["ids"]), row["row"]) for row in adjustment["removed"]}

@@ -524,7 +524,7 @@ def test_blunders_are_searched_once(with_blunders):
 
 
 def removed(ids, file, row, repeats=1, element=""):
-    """A Reading that was set aside."""
+    """A Reading that was rejected."""
     return Reading("", ids, element, file, row, repeats, "m", *(0.0,) * 8, True)
 
 

@@ -1,4 +1,4 @@
-"""What was set aside is named on the terminal: planted blunders come out by name and row."""
+"""What was rejected is named on the terminal: planted blunders come out by name and row."""
 
 import csv
 import shutil
@@ -13,11 +13,11 @@ from tankcal.cli.set_aside import lines_set_aside
 PLANTED = [  # example, table, column, how much more, row, the line that names it
     (
         *("reference-line", "offsets", "offset_mm", 25, 4),
-        "offsets set aside: line A at 2.16 m (row 4)",
+        "offsets rejected: line A at 2.16 m (row 4)",
     ),
     (
         *("total-station", "directions", "direction_gon", 0.3, 2),
-        "readings set aside: S1-S5 (directions.csv, row 2)",
+        "readings rejected: S1-S5 (directions.csv, row 2)",
     ),
 ]
 

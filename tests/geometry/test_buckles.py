@@ -65,7 +65,7 @@ def test_a_deep_buckle_over_a_course_is_wall(points, tmp_path, figure):
 @pytest.mark.slow
 @pytest.mark.parametrize("rings", [(0.2, 0.8), (0.15, 0.5, 0.85)])
 def test_what_24_points_miss_of_a_buckle_is_less_than_what_a_circle_does(rings, tmp_path, figure):
-    """No noise, nothing set aside: the mean over places of the buckle between the points."""
+    """No noise, nothing rejected: the mean over places of the buckle between the points."""
     errors, points, courses = [], 24, 6
     around = FULL_TURN * np.arange(points) / points
     course = np.repeat(np.arange(courses), len(rings) * points)

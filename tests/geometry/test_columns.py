@@ -88,7 +88,7 @@ def seams_at(depth_m, width_m, shape="cosine", course=None):
 
 
 def test_the_table_lies_halfway(tmp_path):
-    """Second method: the same field with the columns set aside, and with all of them kept."""
+    """Second method: the same field with the columns rejected, and with all of them kept."""
     rng, shape = np.random.default_rng(1), seams_at(-0.04, 0.8)
     job = job_of(shape, survey(rng, shape, rings=3, points=72, noise_m=1e-3), tmp_path)
     known = assumed_amplitudes()
@@ -155,7 +155,7 @@ def test_the_budget_has_seams_that_no_column_meets(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", SHAPES)
 def test_seams_that_few_points_of_a_scan_meet_are_within_u(shape, tmp_path, figure):
-    """Over one course, 0.4 m wide, of 5000 points: up to 2.4 U off with the strips set aside."""
+    """Over one course, 0.4 m wide, of 5000 points: up to 2.4 U off with the strips rejected."""
     wall = seams_at(-0.04, 0.4, shape, course=2)
     rng = np.random.default_rng(2)
     off, expanded, _ = judged(wall, scan_of(rng, wall, points=5000, noise_m=1e-3), tmp_path)

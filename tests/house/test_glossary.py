@@ -63,7 +63,7 @@ GLOSSARY = {
         "toriesférico": (r"\btorisf",),
         "borde superior": (r"(?<!juntas a )\btope\b",),
         "excluida": (r"observaci(ón|ones) eliminada", r"\bdescartad"),
-        "superada": (r"RECHAZADA", r"prueba global aceptada"),
+        "superada": (r"(?-i:RECHAZADA)", r"prueba global aceptada"),
         "previsión": (r"\bpredicción de un levantamiento",),
         "punto de control": (r"puntos? de apoyo",),
     },

@@ -229,7 +229,7 @@ def test_the_common_motion_of_points_is_taken_out(job, survey):
 
 @pytest.mark.slow
 def test_points_that_are_not_on_the_wall_are_no_clutter(job, survey):
-    """Pillars of the control stand far off: set aside, and no warning about outliers."""
+    """Pillars of the control stand far off: rejected, and no warning about outliers."""
     away = survey.points + ("A", "B", "C")
     xyz = np.vstack([tank_points(), [[20, 0, 1.0], [0, 20, 2.0], [-20, 0, 1.5]]])
     wider = replace(survey, points=away)

@@ -171,7 +171,7 @@ def test_two_setups_tied_by_targets(tmp_path):
 
 @pytest.mark.slow
 def test_targets_of_the_wall_beside_hits(tmp_path):
-    """Exact geometry: four targets on the wall count, too, and a slip of one is set aside."""
+    """Exact geometry: four targets on the wall count, too, and a slip of one is rejected."""
     parts = tied_parts()
     parts.tables["targets"] = [["point"], *([name] for name in "ABCD")]
     result = run(tmp_path / "sound", parts)
@@ -749,7 +749,7 @@ def test_a_wrong_strap_is_set_aside(tmp_path):
     assert result.straps.accepted.tolist() == [True, False]
     assert ("circumferences.csv", "reading_m") in codes_of(result)
     name, row = parts.tables["circumferences"][2][0], result.straps.reduced[1].strap.row
-    line = f"  circumferences set aside: {name} (row {row})"
+    line = f"  circumferences rejected: {name} (row {row})"
     assert line in [str(one) for one in lines_set_aside(result, None)]
 
 

@@ -92,7 +92,7 @@ def as_points(parts, sd_mm=(1.0, 0.7, 0.5), seed=4):
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("inside", [False, True])
 def test_lines_beside_hits_agree_on_an_exact_wall(tmp_path, inside):
-    """Exact geometry, on either side: nothing is set aside, and the plummet's lean comes out."""
+    """Exact geometry, on either side: nothing is rejected, and the plummet's lean comes out."""
     parts = parts_of()
     for row, plate in zip(parts.tables["courses"][1:], (8.0, 7.0, 5.0, 4.0), strict=True):
         row[2] = plate
@@ -135,7 +135,7 @@ def test_a_misread_offset_beside_hits_is_named(tmp_path):
 
 @pytest.mark.slow
 def test_a_line_read_once_is_controlled_by_nothing(tmp_path):
-    """Its constant takes the reading up: it is neither tested nor set aside."""
+    """Its constant takes the reading up: it is neither tested nor rejected."""
     parts = plumbed(parts_of(circle, tool=NOISY, seed=1), circle, levels=LEVELS[:1])
     parts.tables["offsets"] = [
         row for row in parts.tables["offsets"] if row[0] == "line" or row[5] == 1

@@ -117,7 +117,7 @@ def test_a_given_collimation_is_weighted_with_both_faces(tmp_path):
 
 
 def test_two_plummets_and_a_misread_first_offset(tmp_path):
-    """Each plummet keeps its own collimation, whichever reading is set aside."""
+    """Each plummet keeps its own collimation, whichever reading is rejected."""
     parts = cones()
     parts.registers["instruments"]["ZM"] = {"kind": "plummet"}
     parts.tables["lines"][0].append("instrument")

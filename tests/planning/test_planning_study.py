@@ -47,7 +47,7 @@ def test_some_surveys_scatter_as_predicted(prediction, figure):
 def test_blunders_are_set_aside(prediction, figure):
     """One reading in a hundred off by 20 of its sds: found, and the coordinates stay good."""
     found = simulate(prediction, 6, seed=4, blunders=0.01)
-    figure("values set aside in each of 6 surveys with blunders", found.set_aside.tolist())
+    figure("values rejected in each of 6 surveys with blunders", found.set_aside.tolist())
     assert not found.failed
     assert (found.set_aside > 0).all()
     assert found.ratio < 1.5

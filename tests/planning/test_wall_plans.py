@@ -106,7 +106,7 @@ def about_its_axis(job, wall):
 @pytest.mark.parametrize(("kind", "most"), [("straps", 1e-3), ("lines", 1e-3), ("hits", 1e-2)])
 def test_u_is_that_of_a_job_but_for_the_amplitudes_that_it_learns(tmp_path, kind, most):
     """Jobs on generated walls: with the amplitudes that they learned the plan's U over volume is
-    theirs; what is left is the real wall, its lean and its place, and a hit that was set aside (of
+    theirs; what is left is the real wall, its lean and its place, and a hit that was rejected (of
     six walls hit at most 0.65 %, mostly where the first few levels alone bear on a row).
     """
     for family in ("coil", "chord"):

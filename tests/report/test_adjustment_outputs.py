@@ -404,9 +404,9 @@ def test_the_workbook_of_a_survey_alone(only):
     (table,) = sheet.tables.values()
     assert table.autoFilter is not None
     use = [row[13].value for row in sheet.iter_rows(min_row=5)]
-    assert use.count("set aside") == len(record["adjustment"]["removed"])
+    assert use.count("rejected") == len(record["adjustment"]["removed"])
     assert use.count("compared") == 1
-    faint = next(row for row in sheet.iter_rows(min_row=5) if row[13].value == "set aside")
+    faint = next(row for row in sheet.iter_rows(min_row=5) if row[13].value == "rejected")
     assert faint[0].font.italic
     cells = [cell for name in book.sheetnames for row in book[name] for cell in row]
     assert not [cell for cell in cells if cell.data_type == "f"]
@@ -444,7 +444,7 @@ def test_very_many_readings_are_cut_to_the_worst(only, tmp_path, monkeypatch):
     assert sheet.max_row == 4 + 20
     assert "20 of " in sheet["A2"].value
     use = [row[13].value for row in sheet.iter_rows(min_row=5)]
-    assert use.count("set aside") == len(only[0]["adjustment"]["removed"])
+    assert use.count("rejected") == len(only[0]["adjustment"]["removed"])
 
 
 # the papers
@@ -517,7 +517,7 @@ def test_the_papers_of_a_survey_alone(only):
     text = " ".join(text_of(folder / "working-papers.pdf").split())
     found = record["adjustment"]
     for words in (
-        "The adjustment", "Observations set aside", "Datum", "Instruments", "Cameras",
+        "The adjustment", "Observations rejected", "Datum", "Instruments", "Cameras",
         "Photographs", "Adjusted points", "Check points", "passed: v′Pv", "tape 1", HARD_TEXT,
         "The network from above", HARD_NAME, f"{found['sigma0']:.3f}",
         f"{1000 * found['check_points']['r_xyz_m']:.3g} mm",
@@ -627,7 +627,7 @@ def test_plan_of_many_points_draws_weakest_ellipses(only, monkeypatch):
 
 
 def test_marks_of_many_points_are_one_picture(only, monkeypatch):
-    """Words stay text, and what was set aside is no exception."""
+    """Words stay text, and what was rejected is no exception."""
     paper = Paper(only[1] / "record.json")
     found = paper.record["adjustment"]["residuals"]
     found["removed"] = [
@@ -713,7 +713,7 @@ def test_summary_states_the_quality(job, only, capsys, monkeypatch):
     assert main(["run", str(job), "--only", "adjustment", "--strict"]) == 0
     out = capsys.readouterr().out
     assert out.startswith("adjustment: sigma0 = ")
-    for words in ("global test passed", "3 observations set aside", "48 points", "mean sd 1."):
+    for words in ("global test passed", "3 observations rejected", "48 points", "mean sd 1."):
         assert words in out
 
 

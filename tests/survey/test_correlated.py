@@ -140,7 +140,7 @@ def test_reliability_in_the_general_form(network):
 
 
 def test_setting_aside_equals_a_bias_unknown(network):
-    """A whole vector set aside: the result of an adjustment with three biases, and their test."""
+    """A whole vector rejected: the result of an adjustment with three biases, and their test."""
     survey, covariances = network
     use = np.ones(6)
     use[4] = 0.0

@@ -164,7 +164,7 @@ def test_the_tau_test_does_not_need_the_true_sds(figure):
     hopeful = replace(hopeful, image_points=replace(hopeful.image_points, value=xy))
     by_w = snoop(hopeful, robust=False)
     by_tau = snoop(hopeful, robust=False, test="tau")
-    figure("set aside by w and tau, sds three times too small", f"{len(by_w.removed)}, "
+    figure("rejected by w and tau, sds three times too small", f"{len(by_w.removed)}, "
            f"{len(by_tau.removed)}")  # fmt: skip
     assert [(one.source, one.row) for one in by_tau.removed] == [("image points", 50)]
     assert len(by_w.removed) > 10

@@ -281,7 +281,7 @@ def test_impossible_exact_values_are_refused(survey):
 
 
 def test_snooping_keeps_exact_values(survey):
-    """A fixed distance 5 cm wrong shows in its test quantity, and is not set aside."""
+    """A fixed distance 5 cm wrong shows in its test quantity, and is not rejected."""
     one = exactly(Distances, **ENDS, instrument=np.array([-1, -1]))
     wrong = replace(one, value=one.value + [0.05, 0])
     found = snoop(replace(survey, observations=(*survey.observations, wrong)))

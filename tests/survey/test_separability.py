@@ -1,4 +1,4 @@
-"""What may be wrong in place of an image point that was set aside: coordinates as pairs."""
+"""What may be wrong in place of an image point that was rejected: coordinates as pairs."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -87,7 +87,7 @@ def test_bound_of_the_test_leaves_out_no_alternative(seed, monkeypatch, figure):
 
 
 def test_bound_of_the_test_is_never_above_the_test_itself():
-    """Second method: pairs of random surveys, one set aside, tested again without another one."""
+    """Second method: pairs of random surveys, one rejected, tested again without another one."""
     rng, limit, left_out, kept = np.random.default_rng(5), separability.LIMITS[2], 0, 0
     for _ in range(400):
         design, y = rng.normal(size=(30, 3)), rng.normal(size=30)

@@ -380,7 +380,7 @@ def test_two_networks_that_share_nothing():
 
 
 def test_a_point_with_one_sight_is_left_to_the_adjustment():
-    """It is set aside there, by name; here it only must not stand in the way."""
+    """It is rejected there, by name; here it only must not stand in the way."""
     pairs = [(0, 1), (0, 2), (0, 3), (1, 0), (1, 2)]
     survey = network(
         SQUARE[:4], control(SQUARE, [0, 1]), directions(SQUARE, pairs),

@@ -44,7 +44,7 @@ def held(measurements, number=0, error_m=0.0, sd_m=0.0):
 @pytest.mark.slow
 @pytest.mark.parametrize("error_m", [0.1, pytest.param(2.0, marks=pytest.mark.study)])
 def test_a_station_held_at_a_wrong_place_is_named(stations, error_m):
-    """Good readings are set aside until the rest agrees with it: sigma0 alone would pass."""
+    """Good readings are rejected until the rest agrees with it: sigma0 alone would pass."""
     text = told(held(stations, error_m=error_m))
     name = stations.control.point[0]
     given = TRUTH[1][int(name[1:]), 0]
@@ -63,10 +63,10 @@ def test_held_stations_two_centimetres_apart_from_the_readings(stations):
 
 @pytest.mark.slow
 def test_a_control_point_of_photographs_held_at_a_wrong_place(photos):
-    """Fixed control 50 mm off: its rays are set aside, and it is said whose they are."""
+    """Fixed control 50 mm off: its rays are rejected, and it is said whose they are."""
     name = photos.control.point[0]
     text = told(held(photos, error_m=0.05))
-    assert f"values measured to point {name} were set aside" in text
+    assert f"values measured to point {name} were rejected" in text
     assert f"x of {name} is held fixed" in text
 
 
@@ -74,7 +74,7 @@ def test_sound_control_is_not_doubted(stations, photos):
     for measurements in (stations, photos):
         text = told(held(measurements))
         assert "held fixed" not in text
-        assert "set aside" not in text
+        assert "rejected" not in text
 
 
 @pytest.mark.slow
@@ -104,7 +104,7 @@ def test_weighted_control_that_gives_way_to_a_tape_is_reported(stations):
     zeniths = next(one for one in stations.readings if one.table == "zenith_angles")
     found = adjust_survey(replace(stations, readings=(plan, zeniths, tapes)))
     text = "\n".join(map(str, found.warnings))
-    assert "was set aside: given as" in text
+    assert "was rejected: given as" in text
     scale = float(text.split("fit if all of them are ")[1].split(" ppm")[0])
     assert scale == pytest.approx(2000, abs=150)
 
@@ -152,7 +152,7 @@ def test_a_search_keeps_what_it_found_when_a_step_fails(photos):
     gone = {one.row for one in found.removed if one.file == "image_points.csv"}
     assert gone == {i + 2 for i in wrong}
     assert sum(one.file == "distances.csv" for one in found.removed) == 1
-    assert not [str(one) for one in found.warnings if "nothing was set aside" in str(one)]
+    assert not [str(one) for one in found.warnings if "nothing was rejected" in str(one)]
 
 
 @pytest.mark.slow
@@ -222,7 +222,7 @@ def test_wrong_ray_of_three_cannot_be_identified():
     text = "\n".join(map(str, found.warnings))
     assert any("may equally be" in str(one) for one in found.doubts)
     named = f"azimuth {'ABC'[mine]}-P (row {mine + 2})"
-    assert f"{named} was set aside, but the error may equally be in azimuth" in text
+    assert f"{named} was rejected, but the error may equally be in azimuth" in text
 
 
 @pytest.mark.slow
@@ -418,7 +418,7 @@ def test_wrong_corner_that_costs_readings_is_questioned():
 
 
 def test_held_point_may_be_wrong_instead_of_its_reading():
-    """Property: what was set aside is told with the held coordinates that explain it as well."""
+    """Property: what was rejected is told with the held coordinates that explain it as well."""
     measurements = corners(0.0)
     tapes = measurements.readings[0]
     value = tapes.value.copy()

@@ -1,4 +1,4 @@
-"""A job with another calibration of its camera, and without the readings that were set aside."""
+"""A job with another calibration of its camera, and without the readings that were rejected."""
 
 from dataclasses import replace
 
@@ -171,7 +171,7 @@ def can_be_weighted(calibration):
 
 
 def leave_out_readings(measurements, removed):
-    """job.Measurements in which surveys.Reading rows that were set aside take no part, unsearched.
+    """job.Measurements in which surveys.Reading rows that were rejected take no part, unsearched.
 
     Rows of image points and readings between points are only compared, known coordinates and
     orientations become approximations. Of averaged readings all go.

@@ -2,7 +2,7 @@
 
 Every calibration replaces the job's camera three times: fixed, weighted by its standard deviations
 (its correlations are not known), and free, where it gives start values only. Blunders are searched
-once, in the reference (the job's own settings): what is set aside there is left out of all runs, no
+once, in the reference (the job's own settings): what is rejected there is left out of all runs, no
 run searches again, and all volumes go through the points of the wall that the reference accepted.
 So differences come from the calibration and not from the observations.
 Source: Pessoa 2017.
@@ -83,7 +83,7 @@ class Influence:
 
     camera    name of the camera that was replaced
     searched  whether blunders were searched in the reference
-    removed   tuple of surveys.Reading set aside there, and left out of all runs
+    removed   tuple of surveys.Reading rejected there, and left out of all runs
     free      names of the parameters that runs "free" adjust
     runs      tuple of Run, the reference first      pairs  tuple of Pair of those adjusted
     """
@@ -182,7 +182,7 @@ def influence(
 
 
 def _reference(job, setup, alpha, top):
-    """The Run with the job's own settings, and the readings that its search set aside."""
+    """The Run with the job's own settings, and the readings that its search rejected."""
     begun = Run(REFERENCE, None, None, "failed")
     found, adjustment = _adjusted(job, setup, alpha, begun, top)
     if adjustment is None or not adjustment.removed:

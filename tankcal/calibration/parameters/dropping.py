@@ -1,8 +1,8 @@
 """What happens to the survey and to the volume when parameters of a camera are dropped: done again.
 
 The survey is adjusted again with the parameters off (held at zero), from the same readings: what
-the search for blunders set aside stays aside, and nothing else goes. So the figures differ by the
-parameters alone, and a bad model shows in sigma0 rather than in readings that are set aside. For
+the search for blunders rejected stays rejected, and nothing else goes. So the figures differ by the
+parameters alone, and a bad model shows in sigma0 rather than in readings that are rejected. For
 the same reason the wall is fitted through the same points each time, without a search for others.
 
 Not adjusted by `surveys.adjust_survey`: a camera without a parameter that it needs looks like a

@@ -148,7 +148,7 @@ def _drawn_sizes(job, known, rng):
 
 
 def compare_survey(prediction, wall, job):
-    """Error and U of the full tank, share of rows within theirs, readings that were set aside.
+    """Error and U of the full tank, share of rows within theirs, readings that were rejected.
 
     wall  what was read (`tank_walls.DrawnWall`, or another that says what it holds)
     job   Job with these readings

@@ -25,7 +25,7 @@ def summary(paper):
 
 
 def facts(paper):
-    """What was replaced, how large the survey is, and what its search for blunders set aside."""
+    """What was replaced, how large the survey is, and what its search for blunders rejected."""
     found = paper.result
     states = ", ".join(paper.words["states"].get(state, state) for state in found["states"])
     search = paper.text("not_searched")
@@ -230,7 +230,7 @@ def _are_free(one, other):
 
 
 def removed(paper):
-    """The readings that the reference set aside, and that all runs do without."""
+    """The readings that the reference rejected, and that all runs do without."""
     rows = [
         {
             "observation": observation_name(paper.words, row),

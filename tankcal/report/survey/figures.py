@@ -257,7 +257,7 @@ def vectors_factor(paper, of_photo=None):
 
 @styled
 def photo_residuals(paper, of_photo=None):
-    """Residuals of the image points as vectors, one panel a photo; crosses were set aside.
+    """Residuals of the image points as vectors, one panel a photo; crosses were rejected.
 
     of_photo  as `image_residuals` gives it
     """
@@ -305,7 +305,7 @@ def _half(paper):
 
 
 def image_residuals(paper):
-    """{photo: (xy (n, 2), residuals (n, 2), xy set aside (m, 2))}, mm, of the photos shown."""
+    """{photo: (xy (n, 2), residuals (n, 2), xy rejected (m, 2))}, mm, of the photos shown."""
     wanted = [one["photo"] for one in shown_photos(paper)]
     readings = paper.readings
     readings = readings.take(_are_of(readings, "image coordinate") & ~readings.arrays["check"])
@@ -317,7 +317,7 @@ def image_residuals(paper):
 
 
 def _of_photo(readings):
-    """Of the readings of one photo: image points, residuals, those that were set aside."""
+    """Of the readings of one photo: image points, residuals, those that were rejected."""
     found = readings.arrays
     keys = np.column_stack([found["ids"].codes[:, 1], found["row"]])
     _, first, point = np.unique(keys, axis=0, return_index=True, return_inverse=True)

@@ -1,4 +1,4 @@
-"""Single readings: those set aside, those that fit worst, those that nothing controls."""
+"""Single readings: those rejected, those that fit worst, those that nothing controls."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ WEAK = 0.1  # redundancy number below which a blunder has to be 13 sds to be fou
 
 
 def adjusted(paper):
-    """`ArrayColumns` of readings that took part: neither set aside nor only compared, nor held."""
+    """`ArrayColumns` of readings that took part: neither rejected nor only compared, nor held."""
     found = paper.readings.arrays
     return paper.readings.take(~found["removed"] & ~found["check"] & (found["sd"] != 0))
 
@@ -35,7 +35,7 @@ def table(paper, name, rows, **values):
 
 
 def removed(paper):
-    """Readings that were set aside, the worst first."""
+    """Readings that were rejected, the worst first."""
     return sorted(paper.record["adjustment"]["removed"], key=lambda row: -abs(row["w"] or 0.0))
 
 

@@ -6,7 +6,7 @@ from tankcal.report import blocks
 from tankcal.report.tables.lines import OFFSETS
 
 ACROSS, LETTERS = 12, 72  # lines side by side, and letters of their names
-MOST_SHOWN = 20  # offsets that are shown with their tests, beside those that were set aside
+MOST_SHOWN = 20  # offsets that are shown with their tests, beside those that were rejected
 MARKS = {"used": "{}", "rejected": "{}*", "check": "({})"}
 
 
@@ -40,7 +40,7 @@ def offsets_by_level(paper):
 
 
 def largest_departures(record):
-    """`Table` of the offsets that were set aside, and of those with the largest |w|."""
+    """`Table` of the offsets that were rejected, and of those with the largest |w|."""
     rows = record["lines"]["offsets"]
     order = sorted(range(len(rows)), key=lambda i: _rank(rows[i]))
     aside = sum(one["state"] == "rejected" for one in rows)

@@ -30,7 +30,7 @@ MOST_READINGS = MOST_IN_SHEET  # of the sheet: those with the largest |w|
 MOST_POINTS = MOST_IN_SHEET  # of the sheet: those that were not used, then the weakest
 _LEAST = (34, 12)  # widths of the first columns, where labels and values stand
 _HEAD_ROW = 3
-_MOST_ASIDE = 50  # sentences on points that were set aside
+_MOST_ASIDE = 50  # sentences on points that were rejected
 _MOST_LETTERS = 200  # of the names of photographs in a heading
 
 
@@ -150,7 +150,7 @@ def _weakest(points):
 
 
 def observations_sheet(book, record):
-    """One row a reading, to be filtered; those set aside stand back and say so."""
+    """One row a reading, to be filtered; those rejected stand back and say so."""
     readings = as_columns(record["adjustment"]["residuals"])
     count = readings.count
     subtitle = book.word("texts.residuals_subtitle")
@@ -167,7 +167,7 @@ def observations_sheet(book, record):
 
 
 def _worst(readings):
-    """The worst readings, in their order: those set aside first, then by test quantity."""
+    """The worst readings, in their order: those rejected first, then by test quantity."""
     size = np.abs(np.nan_to_num(readings.arrays["w"]))
     rank = np.lexsort((-size, ~readings.arrays["removed"]))
     return readings.take(np.sort(rank[:MOST_READINGS]))

@@ -51,7 +51,7 @@ def search_blunders(survey, options, gross=None):
         adjusted = adjust(survey, **options)
         text = message(
             "search_failed",
-            "the search for blunders failed ({error}): nothing was set aside, blunders may be in"
+            "the search for blunders failed ({error}): nothing was rejected, blunders may be in"
             " the result",
             error=error.args[0],
         )

@@ -182,7 +182,7 @@ def _wrong(adjusted, known, point, axis, here_m, value_m):
     text = message(
         "wrongly_held",
         "{axis} of {point} is held fixed at {value_m:.4f}, but the readings give "
-        "{here_m:.4f}; if it were not held, far fewer readings would be set aside: this "
+        "{here_m:.4f}; if it were not held, far fewer readings would be rejected: this "
         "value, or another one that is held, may be wrong",
         axis="xyz"[axis],
         point=name,

@@ -65,7 +65,7 @@ def _things(kind, file, ids, known):
 def _far_more(name, k, n):
     return message(
         "point_lost_much",
-        "{gone} of the {count} values measured to point {point} were set aside, far more than of"
+        "{gone} of the {count} values measured to point {point} were rejected, far more than of"
         " other points: its coordinates may be wrong, not the readings",
         gone=k,
         count=n,
@@ -76,7 +76,7 @@ def _far_more(name, k, n):
 def _much_of_photo(name, k, n):
     return message(
         "photo_lost_much",
-        "{gone} of the {count} values of photo {photo} were set aside, far more than of "
+        "{gone} of the {count} values of photo {photo} were rejected, far more than of "
         "others: check the whole photo",
         gone=k,
         count=n,
@@ -99,7 +99,7 @@ def _lost_control(readings):
 def _lost(one):
     return message(
         "control_set_aside",
-        "{axis} of {point} was set aside: given as {value_m:.4f} (sd {sd_m:.4f}), but the "
+        "{axis} of {point} was rejected: given as {value_m:.4f} (sd {sd_m:.4f}), but the "
         "readings give {here_m:.4f}",
         axis=one.element,
         point=one.ids[0],
@@ -114,7 +114,7 @@ def _many(gone, total):
         return []
     text = message(
         "many_set_aside",
-        "{gone} of {total} values ({percent:.0f} %) were set aside: more than single blunders "
+        "{gone} of {total} values ({percent:.0f} %) were rejected: more than single blunders "
         "explain; first check what is held fixed, the scales and the standard deviations",
         gone=gone,
         total=total,
@@ -136,7 +136,7 @@ def find_undecided_outliers(adjusted, removed, held, held_trace):
             names = [_named(adjusted, held_trace, *other) for other in others]
             text = message(
                 "undecided",
-                "{reading} was set aside, but the error may equally be in {others}: the "
+                "{reading} was rejected, but the error may equally be in {others}: the "
                 "readings cannot decide",
                 reading=_named(adjusted, held_trace, one.source, one.row),
                 others=_either(names),
@@ -146,7 +146,7 @@ def find_undecided_outliers(adjusted, removed, held, held_trace):
     if len(found) > LISTED:
         text = message(
             "more_undecided",
-            "the same is true of {more} more readings that were set aside",
+            "the same is true of {more} more readings that were rejected",
             more=len(found) - LISTED,
         )
         found[LISTED:] = [Problem("job.toml", text, None, "adjustment.snooping")]
