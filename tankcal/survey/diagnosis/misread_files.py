@@ -28,7 +28,7 @@ EXCHANGED = 7  # control points of which each two are exchanged
 CONTROL = "control.csv"
 MOST_SETUPS = 30  # whose circles are supposed, one after the other, to show another unit
 MOST = 12  # photos that are left out one after the other
-ALIKE_FAILURES = 10  # trials that end as the survey itself did: then readings are missing
+ALIKE_FAILURES = 6  # trials that end as the survey itself did: then readings are missing
 
 
 def likely_mistake(measurements, sigma0, run, failure=None):

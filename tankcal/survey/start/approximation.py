@@ -85,7 +85,10 @@ def _found(clues, sure, hints):
     for least in (SURE, 3):  # photos that see few known points are better placed by other photos
         piece = grow_piece(clues, piece, least)
         piece = _with_hints(clues, piece, sure, hints, least)
+        grown = int(piece.known.sum())
         piece, reasons = join_local_frames(clues, piece, hints.piece.place_m, least)
+        if clues.survey.photos is None and piece.known.sum() == grown:
+            break  # without photographs and new points the second pass is the first one
     soft = hints.piece.known & ~np.isfinite(sure.piece.xyz_m).any(axis=1)
     piece = add_points(clues.sights, replace(piece, by_photos=piece.by_photos | soft))
     piece = repair_photos(clues.sights, piece, sure.piece.oriented, clues.rng, clues.wall)
