@@ -128,6 +128,8 @@ def group_by_height(height_m, azimuth_rad, course, joints_m):
             continue
         span = (float(joints_m[index]), float(joints_m[index + 1]))
         tall = span[1] - span[0]
+        # Rings are accepted only if every cluster is a complete, level ring; otherwise the whole
+        # course becomes a single group with a fit in height.
         rings = _split_rings(height_m[members], tall)
         name = str(index + 1)
         if len(rings) > 1 and all(
@@ -173,6 +175,7 @@ def group_by_name(names, height_m, course_of, azimuth_rad=None, joints_m=None):
     """
     groups = []
     for name in dict.fromkeys(names):
+        # dict.fromkeys keeps the order of the names, so that the result does not depend on hashing.
         members = np.array([i for i, item in enumerate(names) if item == name])
         height = float(height_m[members].mean())
         course = int(course_of(height))
@@ -204,6 +207,7 @@ def _find_degree(group, height_m, azimuth_rad):
     harmonics of the section are estimated as well, because points along a spiral do not separate
     them from a taper.
     """
+    # Level points cannot determine a slope in height.
     bottom, top = group.span_m
     if np.ptp(height_m) <= RING_SPREAD * (top - bottom):
         return 0
@@ -318,6 +322,7 @@ def own_covariances(covariance_m2):
     if not scipy.sparse.issparse(covariance_m2):
         return None
     entries = covariance_m2.tocoo()
+    # An entry that relates two points contradicts independence.
     (point, row), (other, column) = (np.divmod(index, 3) for index in (entries.row, entries.col))
     if np.any(point != other):
         return None
