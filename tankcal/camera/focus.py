@@ -164,12 +164,14 @@ def refer_to_focus(xy_mm, depth_mm, interior, form, lens):
     """
     at_focus = np.broadcast_to(np.asarray(interior, dtype=float), (len(xy_mm), len(PARAMETERS)))
     known = np.isfinite(depth_mm)
-    in_depth = at_focus[known].copy()
+    depth_interior = at_focus[known].copy()
     # Only the difference of both calibrations counts; `interior` may come from another adjustment.
-    in_depth[:, _FIRST : _FIRST + 3] += lens.in_depth(np.asarray(depth_mm)[known]) - lens.focused
+    depth_interior[:, _FIRST : _FIRST + 3] += (
+        lens.in_depth(np.asarray(depth_mm)[known]) - lens.focused
+    )
     image = np.array(xy_mm, dtype=float)
     # Correct with the distortion in depth, then distort with the distortion in focus.
     image[known] = distort_image_points(
-        correct_image_points(image[known], in_depth, form), at_focus[known], form
+        correct_image_points(image[known], depth_interior, form), at_focus[known], form
     )
     return image
