@@ -376,10 +376,10 @@ def _select_readmitted(agrees, statistic, return_counts, returns):
     """Mask of readmitted candidates: all at their first pass, later only the best."""
     first = agrees & (return_counts == 0)
     # Readmitting one candidate at a time prevents an endless exchange of two candidates.
-    again = np.where(agrees & (return_counts < returns), statistic, np.inf)
-    if first.any() or not np.isfinite(again).any():
+    candidates = np.where(agrees & (return_counts < returns), statistic, np.inf)
+    if first.any() or not np.isfinite(candidates).any():
         return first
-    return again == again.min()
+    return candidates == candidates.min()
 
 
 def find_determined(pivots, rows, of_normals=False):
@@ -402,7 +402,7 @@ def find_determined(pivots, rows, of_normals=False):
     Notes
     -----
     This is the only rule for the rank, here and in tankcal.solver. The columns are scaled to length
-    one beforehand. A pivot of the rows (QR) must exceed max(rows, k) eps times the largest pivot. A
+    one. A pivot of the rows (QR) must exceed max(rows, k) eps times the largest pivot. A
     squared pivot of normal equations (Cholesky) must reach 1e-12, because squaring loses half the
     digits.
 

@@ -203,6 +203,7 @@ def problem_from(plain):
     -------
     Problem
     """
+    # Records without a code contain a text that is not translated.
     text = plain["text"]
     if plain.get("code"):
         text = Message(text)
@@ -218,6 +219,7 @@ class InputError(TankcalError):
 
     def __init__(self, problems):
         self.problems = tuple([problems] if isinstance(problems, Problem) else problems)
+        # The text of the exception contains all problems, one in each line.
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
     def __reduce__(self):  # keeps the problems when the error is pickled by another process
@@ -257,6 +259,7 @@ class ProgramError(TankcalError):
     """
 
     def __init__(self, message):
+        # The message states that no result was written.
         super().__init__(
             f"{message}: this contradicts itself, so nothing is stated. It is a mistake of "
             "tankcal; please report it with the job"

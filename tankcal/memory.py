@@ -21,6 +21,7 @@ def without_collection():
     try:
         yield
     finally:
+        # A nested call must not enable the collector of the outer context.
         if was_on:
             gc.enable()
 

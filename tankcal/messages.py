@@ -169,6 +169,7 @@ def fill_template(template, values, number=format, said=str):
     -------
     str
     """
+    # str.format cannot write lists and messages as required.
     return _Filler(number, said).vformat(template, (), values)
 
 
@@ -190,6 +191,7 @@ def as_plain(text):
     dict
         {"code", "values"}; the code is None and the values are empty for a text that is no Message.
     """
+    # Any other text has no values.
     values = {name: _plain(value) for name, value in getattr(text, "values", {}).items()}
     return {"code": getattr(text, "code", None), "values": values}
 

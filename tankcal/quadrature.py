@@ -68,6 +68,7 @@ def polar_products(radii_m, weights_rad):
     4.0
     """
     radii_m = np.atleast_2d(radii_m)
+    # The area element in polar coordinates is r^2 dtheta / 2.
     return 0.5 * (radii_m * weights_rad) @ radii_m.T
 
 

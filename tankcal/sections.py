@@ -323,8 +323,10 @@ def own_covariances(covariance_m2):
         return None
     entries = covariance_m2.tocoo()
     # An entry that relates two points contradicts independence.
-    (point, row), (other, column) = (np.divmod(index, 3) for index in (entries.row, entries.col))
-    if np.any(point != other):
+    (point, row), (column_point, column) = (
+        np.divmod(index, 3) for index in (entries.row, entries.col)
+    )
+    if np.any(point != column_point):
         return None
     blocks = np.zeros((covariance_m2.shape[0] // 3, 3, 3))
     np.add.at(blocks, (point, row, column), entries.data)

@@ -246,8 +246,8 @@ def _design_rows(centred):
     """Derivatives (2n, 6) of the image of centred points (n, 2) by a1, a2, x', a4, a5, y'."""
     x, y = centred.T
     zeros, ones = np.zeros_like(x), np.ones_like(x)
-    both = np.array([[x, y, ones, zeros, zeros, zeros], [zeros, zeros, zeros, x, y, ones]])
-    return both.transpose(2, 0, 1).reshape(-1, 6)
+    stacked = np.array([[x, y, ones, zeros, zeros, zeros], [zeros, zeros, zeros, x, y, ones]])
+    return stacked.transpose(2, 0, 1).reshape(-1, 6)
 
 
 def _fit_linear(readings, marks, kind):
@@ -421,6 +421,6 @@ def _fits_after_exchange(readings, marks, kind, pair):
 
 def _fits_without(readings, marks, kind, number):
     """Whether the fit is valid without one mark."""
-    kept = np.arange(len(marks)) != number
-    fit = _Fit.of(readings[kept], marks[kept], kind)
+    is_kept = np.arange(len(marks)) != number
+    fit = _Fit.of(readings[is_kept], marks[is_kept], kind)
     return fit is not None and fit.is_sound

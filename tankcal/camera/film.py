@@ -63,6 +63,7 @@ def heights_at(surface, xy_mm):
     from scipy.spatial import cKDTree
 
     xy_mm = np.asarray(xy_mm, dtype=float)
+    # Points without a measurement stay nan.
     is_finite = np.isfinite(xy_mm).all(axis=1)
     heights = np.full(len(xy_mm), np.nan)
     if is_finite.any():

@@ -131,6 +131,7 @@ def depth_factor(depth_mm, focus_mm, focal_length_mm):
     >>> round(float(depth_factor(4000.0, 2000.0, 50.0)), 6)
     0.987342
     """
+    # (s - f)/(s' - f) s'/s, with both distances as reciprocals, so that they may be infinite.
     f = focal_length_mm
     return (1 - f / focus_mm) / (1 - f / np.asarray(depth_mm, dtype=float))
 
@@ -163,15 +164,15 @@ def refer_to_focus(xy_mm, depth_mm, interior, form, lens):
     with the coefficients in focus. The method applies to every convention.
     """
     at_focus = np.broadcast_to(np.asarray(interior, dtype=float), (len(xy_mm), len(PARAMETERS)))
-    known = np.isfinite(depth_mm)
-    depth_interior = at_focus[known].copy()
+    is_finite = np.isfinite(depth_mm)
+    depth_interior = at_focus[is_finite].copy()
     # Only the difference of both calibrations counts; `interior` may come from another adjustment.
     depth_interior[:, _FIRST : _FIRST + 3] += (
-        lens.in_depth(np.asarray(depth_mm)[known]) - lens.focused
+        lens.in_depth(np.asarray(depth_mm)[is_finite]) - lens.focused
     )
     image = np.array(xy_mm, dtype=float)
     # Correct with the distortion in depth, then distort with the distortion in focus.
-    image[known] = distort_image_points(
-        correct_image_points(image[known], depth_interior, form), at_focus[known], form
+    image[is_finite] = distort_image_points(
+        correct_image_points(image[is_finite], depth_interior, form), at_focus[is_finite], form
     )
     return image

@@ -257,12 +257,12 @@ def image_point_derivatives(p, r, q, form, of_ideal):
     # The affinity before the distortion: derivatives of x = s (x' - B y) by A and B.
     affinity_factor = form[6] / (1.0 + form[6] * q[11])
     by_a, by_b = by_kx[8] - affinity_factor * (x - q[1]), by_kx[9] - affinity_factor * (y - q[2])
-    one, zero = 1.0 + 0.0 * x, 0.0 * x
+    unit, zero = 1.0 + 0.0 * x, 0.0 * x
     return (
         x,
         y,
-        seven(a, b, dxi, deta) + (one, zero) + by_kx[:8] + (by_a, by_b),
-        seven(c, d, dxi, deta) + (zero, one) + ten(g, h, kx, ky),
+        seven(a, b, dxi, deta) + (unit, zero) + by_kx[:8] + (by_a, by_b),
+        seven(c, d, dxi, deta) + (zero, unit) + ten(g, h, kx, ky),
     )
 
 

@@ -182,6 +182,7 @@ def _interpolate_quantiles(upper, dof):
 def _quantile_coefficients(upper):
     """Coefficients of the powers of x in the Chebyshev polynomial of the quantile."""
     polynomial = Chebyshev.interpolate(lambda x: stdtrit(2 * _SMOOTH_DOF / (x + 1), upper), _DEGREE)
+    # Powers of x are faster to evaluate than Chebyshev polynomials.
     return tuple(cheb2poly(polynomial.coef))
 
 
@@ -220,12 +221,12 @@ def student_quantile(tail, dof):
     x *= 2 / _SQUARE
     x -= 1.0
     # Outside the range of the polynomial, also for z = -inf.
-    beyond = ~(x <= 1.0)
-    x[beyond] = 1.0
+    is_outside = ~(x <= 1.0)
+    x[is_outside] = 1.0
     t = _evaluate_polynomial(_ratio_coefficients(dof), x)
     np.exp(t, out=t)
     t *= z
-    t[beyond] = _evaluate_quantiles(tail[beyond], dof)
+    t[is_outside] = _evaluate_quantiles(tail[is_outside], dof)
     return t
 
 

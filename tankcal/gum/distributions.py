@@ -187,6 +187,7 @@ class StudentT(Distribution):
         return self.scale
 
     def _distance(self, tail):
+        # student_quantile is negative for the lower tail.
         return -self.scale * student_quantile(tail, self.dof)
 
     def _transform(self, t):
@@ -235,6 +236,7 @@ class Rectangular(_Bounded):
     squared_ratio = 3.0
 
     def _distance(self, tail):
+        # Linear distribution function: tail = (1 - distance/a)/2.
         return self.half_width * (1 - 2 * tail)
 
     def _transform(self, t):
@@ -261,9 +263,11 @@ class Triangular(_Bounded):
     squared_ratio = 6.0
 
     def _distance(self, tail):
+        # tail = (1 - distance/a)^2/2.
         return self.half_width * (1 - np.sqrt(2 * tail))
 
     def _transform(self, t):
+        # Sum of two rectangular distributions of half the width.
         return (np.sin(t / 2) / (t / 2)) ** 2
 
 
@@ -289,9 +293,11 @@ class UShaped(_Bounded):
     squared_ratio = 2.0
 
     def _distance(self, tail):
+        # Projection of a uniform phase.
         return self.half_width * np.cos(np.pi * tail)
 
     def _transform(self, t):
+        # Bessel function of order 0 (integral over the phase).
         return j0(t)
 
 
@@ -348,8 +354,8 @@ class CurvilinearTrapezoid(Distribution):
         plateau = -np.log1p(-2 * relative)
         flat = (0.5 - tail) * 4 * relative / plateau
         # Beyond the inner limit: tail = P(2, y)/(4 relative), with |x| = outermost exp(-y).
-        within = np.minimum(4 * relative * tail, gammainc(2, plateau))
-        return self.half_width * np.where(flat < inner, flat, np.exp(-gammaincinv(2, within)))
+        tail_area = np.minimum(4 * relative * tail, gammainc(2, plateau))
+        return self.half_width * np.where(flat < inner, flat, np.exp(-gammaincinv(2, tail_area)))
 
     def _transform(self, t):
         # The sine integral is the transform of the logarithmic density.
@@ -404,6 +410,7 @@ def standard(u, name="normal", *, dof=np.inf, mean=0.0, u_is="scale"):
     if u_is == "sd" and not dof > 2:
         raise ValueError(f"Student's t with {dof} degrees of freedom has no standard deviation")
     if u_is == "sd":
+        # scale = sd sqrt((dof - 2)/dof).
         return StudentT(u * np.sqrt(1 - 2 / dof), mean=mean, dof=dof, by_sd=True)
     return StudentT(u, mean=mean, dof=dof)
 
@@ -486,6 +493,7 @@ def expanded(U, *, k=None, probability=None, dof=np.inf, mean=0.0):
         k = float(coverage_factor(probability, dof))
     if not 0 < k < np.inf:
         raise ValueError(f"coverage factor {k}: expected above 0")
+    # JCGM 100 4.3.3: the standard uncertainty is U/k.
     return standard(U / k, dof=dof, mean=mean)
 
 

@@ -94,7 +94,11 @@ class Inputs:
             raise ValueError(f"input given twice: {', '.join(twice)}; a shared input is one input")
         # Without correlations, the matrix is the identity.
         pairs = {} if correlation is None else correlation
-        matrix = self._of_pairs(pairs) if isinstance(pairs, dict) else np.array(pairs, dtype=float)
+        matrix = (
+            self._build_correlation(pairs)
+            if isinstance(pairs, dict)
+            else np.array(pairs, dtype=float)
+        )
         self.correlation = _check_correlation(matrix, self.names)
         self.estimates = np.array([item.distribution.mean for item in self.inputs])
         self.u = np.array([item.distribution.u for item in self.inputs])
@@ -143,7 +147,7 @@ class Inputs:
             for group in self.groups
         )
 
-    def _of_pairs(self, pairs):
+    def _build_correlation(self, pairs):
         """Correlation matrix from a dictionary of pairs."""
         matrix = np.eye(len(self))
         for (first, second), r in pairs.items():

@@ -186,12 +186,12 @@ def _central_differences(model, x, middle, steps):
     """Slopes (rows, n) over +- steps, and difference of the slopes on both sides."""
     slopes, bends = [], []
     for i, step in enumerate(steps):
-        up, down = x.copy(), x.copy()
-        up[i], down[i] = x[i] + step, x[i] - step
-        above, below = outputs_of(model, up), outputs_of(model, down)
+        x_up, x_down = x.copy(), x.copy()
+        x_up[i], x_down[i] = x[i] + step, x[i] - step
+        y_up, y_down = outputs_of(model, x_up), outputs_of(model, x_down)
         # Divided by the step as stored, which rounding may have changed.
-        slopes.append((above - below) / (up[i] - down[i]))
-        bends.append((above - middle) / (up[i] - x[i]) - (middle - below) / (x[i] - down[i]))
+        slopes.append((y_up - y_down) / (x_up[i] - x_down[i]))
+        bends.append((y_up - middle) / (x_up[i] - x[i]) - (middle - y_down) / (x[i] - x_down[i]))
     return np.stack(slopes, axis=1), np.stack(bends, axis=1)
 
 

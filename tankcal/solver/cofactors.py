@@ -153,7 +153,7 @@ class Cofactors:
         if self.datum is None:
             return cofactors
         columns = self.plan.reduced + np.arange(3 * self.plan.blocks).reshape(-1, 3)
-        return self._in_datum(cofactors, columns, columns)
+        return self._transform_to_datum(cofactors, columns, columns)
 
     def reduced_blocks(self, columns):
         """Cofactors (n, k, k) of groups of reduced unknowns, in the datum.
@@ -170,7 +170,11 @@ class Cofactors:
         if not self.plan.reduced:
             return np.zeros((*columns.shape, columns.shape[1]))
         cofactors = self.reduced_cofactors[columns[:, :, None], columns[:, None, :]]
-        return cofactors if self.datum is None else self._in_datum(cofactors, columns, columns)
+        return (
+            cofactors
+            if self.datum is None
+            else self._transform_to_datum(cofactors, columns, columns)
+        )
 
     def among(self, columns):
         """Cofactor matrix of selected unknowns, in the datum.
@@ -201,7 +205,7 @@ class Cofactors:
             whitened = self.factor.whitened(propagation)
             q = whitened.T @ whitened
         add_own_cofactors(self.plan, normals, columns, q)
-        return q if self.datum is None else self._in_datum(q, columns, columns)
+        return q if self.datum is None else self._transform_to_datum(q, columns, columns)
 
     @cached_property
     def datum(self):
@@ -222,7 +226,7 @@ class Cofactors:
         h = self.times(datum_basis) @ inverse.T
         return null_space, h, inverse @ (datum_basis.T @ h)
 
-    def _in_datum(self, q, rows, columns):
+    def _transform_to_datum(self, q, rows, columns):
         """Transform cofactors (..., r, k) between unknowns (..., r) and (..., k) to the datum."""
         null_space, h, m = self.datum
         g = np.swapaxes(null_space[columns], -1, -2)
@@ -327,6 +331,6 @@ class Cofactors:
         if not len(columns) or self.datum is None:
             return np.zeros(jac.shape[:2])
         # T Q T' - Q is the transformation of a zero matrix.
-        change = self._in_datum(0.0, columns, columns)
+        change = self._transform_to_datum(0.0, columns, columns)
         jac = np.where(columns[:, None] < 0, 0.0, jac)
         return np.einsum("nmk,nkl,nml->nm", jac, change, jac)

@@ -27,10 +27,10 @@ def add_rows(plan, batch, w, jac, normals):
         Changed in place.
     """
     if is_worth_compiling():
-        has = batch.block is not None
-        block, place = (batch.block, batch.place) if has else (batch.first, batch.first)
+        has_block = batch.block is not None
+        block, place = (batch.block, batch.place) if has_block else (batch.first, batch.first)
         compile_functions(loops, loops.COMPILED)._add_rows(
-            w, jac, has, block.ravel(), batch.first, place, batch.cuts, plan.starts,
+            w, jac, has_block, block.ravel(), batch.first, place, batch.cuts, plan.starts,
             normals.v, normals.wide, normals.b, normals.t, normals.g,
         )  # fmt: skip
         return
@@ -74,16 +74,16 @@ def eliminate(plan, normals, damping, smallest):
             plan.alike, normals.t, normals.g, damping, smallest,
         )  # fmt: skip
     # add_rows may have stored a product below the diagonal: move it to the upper half.
-    below = np.tril(normals.t, -1)
-    normals.t += below.T - below
+    lower_half = np.tril(normals.t, -1)
+    normals.t += lower_half.T - lower_half
     v = np.zeros((plan.blocks, 3, 3))
     v[:, *np.tril_indices(3)] = normals.v
     v += np.tril(v, -1).transpose(0, 2, 1)
     diagonal = np.einsum("nii->ni", v)
-    before = diagonal.copy()
+    previous_diagonal = diagonal.copy()
     diagonal *= 1 + damping
     # The rank of a block is judged with unit diagonal, independent of the units.
-    scale = np.sqrt(np.where(before > 0, before, 1.0))
+    scale = np.sqrt(np.where(previous_diagonal > 0, previous_diagonal, 1.0))
     values = np.linalg.eigvalsh(v / (scale[:, :, None] * scale[:, None, :]))
     undetermined = np.flatnonzero(~(values[:, 0] > smallest))
     if len(undetermined):

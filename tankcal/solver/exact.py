@@ -102,14 +102,16 @@ class Conditions:
             # The step may leave the datum of a free network; in_datum removes that part.
             state = self.model.moved(state, self.model.in_datum(state, whole))
             size = np.linalg.norm(step)
-            off = np.abs(c[tangent.independent]).max(initial=0.0)
+            misclosure = np.abs(c[tangent.independent]).max(initial=0.0)
             # Converged, or stalled at the level of rounding.
-            if size < CLOSED or (size > previous_size / 2 and off < ROUNDED):
+            if size < CLOSED or (size > previous_size / 2 and misclosure < ROUNDED):
                 self._refuse_contradiction(tangent, state)
                 return state
             previous_size = size
         if strict:
-            raise SolutionError(self._in_words(self.evaluate(state)[0], range(self.rows)))
+            raise SolutionError(
+                self._describe_contradiction(self.evaluate(state)[0], range(self.rows))
+            )
         return None
 
     def _refuse_contradiction(self, tangent, state):
@@ -117,15 +119,15 @@ class Conditions:
         c = self.evaluate(state)[0]
         if np.abs(c).max() > CONTRADICTION:
             involved = [*tangent.companions(int(np.argmax(np.abs(c))))]
-            raise SolutionError(self._in_words(c, involved))
+            raise SolutionError(self._describe_contradiction(c, involved))
 
-    def _in_words(self, c, rows):
+    def _describe_contradiction(self, c, rows):
         """Message on contradicting conditions, the largest misclosures first."""
-        off = np.abs(c)
-        rows = sorted(rows, key=lambda row: -off[row])[:NAMES_SHOWN]
+        gaps = np.abs(c)
+        rows = sorted(rows, key=lambda row: -gaps[row])[:NAMES_SHOWN]
         names = ", ".join(self.model.name_of_exact(row) for row in rows)
         return (
-            f"values held exactly contradict one another, by {off.max():.2g} m or rad: {names}; "
+            f"values held exactly contradict one another, by {gaps.max():.2g} m or rad: {names}; "
             "give one of them a standard deviation or leave it out"
         )
 
@@ -166,7 +168,7 @@ class Tangent:
         self.r = np.triu(packed[: self.rank, : self.rank])
         self._packed, self._tau = np.asfortranarray(packed[:, : self.rank]), tau[: self.rank]
 
-    def _turned(self, matrix, transposed):
+    def _multiply_by_q(self, matrix, transposed):
         """Multiply a matrix (nr,) or (nr, k) by Q' (transposed) or by Q."""
         if not self.rank:
             return matrix
@@ -183,8 +185,8 @@ class Tangent:
 
     def split(self, matrix):
         """Parts Q1' M and Q2' M of a matrix (nr,) or (nr, k)."""
-        turned = self._turned(matrix, True)
-        return turned[: self.rank], turned[self.rank :]
+        product = self._multiply_by_q(matrix, True)
+        return product[: self.rank], product[self.rank :]
 
     def in_null_space(self, matrix):
         """Component Q2' M in the null space of a matrix (nr,) or (nr, k)."""
@@ -192,13 +194,13 @@ class Tangent:
 
     def from_null_space(self, inner, outer=None):
         """Combine Q2 inner + Q1 outer, shape (nr,) or (nr, k); without `outer`, Q2 inner."""
-        above = np.zeros((self.rank, *inner.shape[1:])) if outer is None else outer
-        return self._turned(np.concatenate([above, inner]), False)
+        first_part = np.zeros((self.rank, *inner.shape[1:])) if outer is None else outer
+        return self._multiply_by_q(np.concatenate([first_part, inner]), False)
 
     def square(self, s):
         """Q2' S Q2 of a symmetric matrix S (nr, nr), and Q1' S Q (rank, nr)."""
-        turned = self._turned(self._turned(s, True).T, True)
-        return turned[self.rank :, self.rank :], turned[: self.rank]
+        product = self._multiply_by_q(self._multiply_by_q(s, True).T, True)
+        return product[self.rank :, self.rank :], product[: self.rank]
 
     def closing(self, c):
         """Shortest step (nr,), scaled, that closes the misclosures (m,) of independent rows."""

@@ -242,7 +242,7 @@ class _Solution:
             untouched &= ~tangent.touched
         undetermined_block = eliminate(self.plan, normals, damping, SMALLEST_PIVOT)
         if undetermined_block >= 0:
-            return self._look(state, damping, undetermined_block)
+            return self._raise_if_undetermined(state, damping, undetermined_block)
         scale = 1.0 / np.sqrt(diagonal)
         null_space = datum_basis = datum_rows = None
         # A free network: the null space is fixed by adding rows with full weight. Damping makes
@@ -259,21 +259,21 @@ class _Solution:
             datum_rows = np.linalg.qr(null_space[:nr] / scale[:, None])[0]
         # QR of small systems does not square the condition number.
         if self.plan.blocks == 0 and self.rows.count * nr * nr < SMALL:
-            lower, is_regular, reaction_part = self._dense_root(
+            lower, is_regular, reaction_part = self._factor_by_qr(
                 scale, untouched, damping, datum_rows, tangent
             )
         else:
-            lower, is_regular, reaction_part = self._root(
+            lower, is_regular, reaction_part = self._factor_by_cholesky(
                 scale, untouched, damping, datum_rows, tangent
             )
         if not is_regular:
-            return self._look(state, damping, None)
+            return self._raise_if_undetermined(state, damping, None)
         untouched = untouched.nonzero()[0]
         return Factor(
             normals, scale, lower, untouched, null_space, datum_basis, tangent, reaction_part
         )
 
-    def _root(self, scale, untouched, damping, datum_rows, tangent):
+    def _factor_by_cholesky(self, scale, untouched, damping, datum_rows, tangent):
         """Cholesky factor of the scaled reduced system.
 
         Returns the factor, whether its pivots exceed rounding, and the reaction part of the exact
@@ -298,8 +298,8 @@ class _Solution:
         )
         return lower, is_regular, reaction_part
 
-    def _dense_root(self, scale, untouched, damping, datum_rows, tangent):
-        """Factor like `_root`, but by QR of the rows, without forming normal equations."""
+    def _factor_by_qr(self, scale, untouched, damping, datum_rows, tangent):
+        """Factor like `_factor_by_cholesky`, but from the rows, without normal equations."""
         nr = self.plan.reduced
         # Rows for unknowns without observations, for the damping and for the datum.
         rows = [np.diag(untouched.astype(float)), np.sqrt(damping) * np.eye(nr)]
@@ -322,7 +322,7 @@ class _Solution:
         lower = np.asfortranarray((r * np.sign(r.diagonal())[:, None]).T)
         return lower, find_determined(lower.diagonal(), self.rows.count).all(), reaction_part
 
-    def _look(self, state, damping, bad_block):
+    def _raise_if_undetermined(self, state, damping, bad_block):
         """Raise UndeterminedError if an undamped factorisation failed for lack of observations."""
         reason = None if damping else diagnosis(self, state, bad_block)
         if reason:

@@ -63,14 +63,14 @@ def _add_squares(w, jac, skip, first, cuts, t, g):
         # Collect neighbouring rows with equal columns.
         while end < n and _is_alike(first, end, begin):
             end += 1
-        at, columns = m * begin * width + skip, first[begin]
+        start, columns = m * begin * width + skip, first[begin]
         rows = m * (end - begin)
-        _add_square(1.0, flat, at, width, rows, columns, cuts, pack, square, flat_t, len(g))
-        _product(flat, at, width, errors[m * begin : m * end], product)
+        _add_square(1.0, flat, start, width, rows, columns, cuts, pack, square, flat_t, len(g))
+        _product(flat, start, width, errors[m * begin : m * end], product)
         for run in range(runs):
-            to = first[begin, run] - cuts[run]
+            shift = first[begin, run] - cuts[run]
             for a in range(cuts[run], cuts[run + 1]):
-                g[to + a] += product[a]
+                g[shift + a] += product[a]
 
 
 def _is_alike(first, i, j):
@@ -81,7 +81,7 @@ def _is_alike(first, i, j):
     return alike
 
 
-def _add_square(sign, flat, at, width, rows, first, cuts, pack, square, flat_t, width_t):
+def _add_square(sign, flat, start, width, rows, first, cuts, pack, square, flat_t, width_t):
     """Add or subtract the upper half of Y'Y at the places of its columns in t.
 
     sign
@@ -98,7 +98,7 @@ def _add_square(sign, flat, at, width, rows, first, cuts, pack, square, flat_t, 
         high = min(low + PANEL, n)
         for left in range(low, n, WIDE):
             right = min(left + WIDE, n)
-            _square(flat, at, width, rows, low, high, left, right, pack, square)
+            _square(flat, start, width, rows, low, high, left, right, pack, square)
             _spread(sign, first, cuts, low, high, left, right, square, flat_t, width_t)
 
 
@@ -120,15 +120,17 @@ def _spread(sign, first, cuts, low, high, left, right, square, flat, width):
             if other_shift + cuts[other_run] >= shift + cuts[run]:
                 for a in range(begin, end):
                     start = max(a, start)
-                    at = np.uintp((a - low) * WIDE + start - left)
-                    into = np.uintp((shift + a) * width + other_shift + start)
+                    index = np.uintp((a - low) * WIDE + start - left)
+                    target = np.uintp((shift + a) * width + other_shift + start)
                     for q in range(np.uintp(max(stop - start, 0))):
-                        flat[into + q] += sign * square[at + q]
+                        flat[target + q] += sign * square[index + q]
             else:
                 for q in range(start, stop):
-                    at = q - left - low * WIDE
+                    index = q - left - low * WIDE
                     for a in range(begin, end):
-                        flat[(other_shift + q) * width + shift + a] += sign * square[at + a * WIDE]
+                        flat[(other_shift + q) * width + shift + a] += (
+                            sign * square[index + a * WIDE]
+                        )
 
 
 def _square(flat, first, width, rows, low, high, left, right, pack, out):
@@ -148,12 +150,12 @@ def _square(flat, first, width, rows, low, high, left, right, pack, out):
         for q in range(whole):
             out[a * np.uintp(WIDE) + q] = 0.0
     for row in range(0, rows, 6):
-        at = first + row * width
-        _pack(flat, at + left, width, rows - row, n, 0, pack)
+        index = first + row * width
+        _pack(flat, index + left, width, rows - row, n, 0, pack)
         if left > low:
             # The left columns are packed separately if they do not begin with the right columns.
             offset = 6 * WIDE
-            _pack(flat, at + low, width, rows - row, np.uintp(high - low), offset, pack)
+            _pack(flat, index + low, width, rows - row, np.uintp(high - low), offset, pack)
         for a in range(low, high, 2):
             i = np.uintp(offset + a - low)
             # Two left columns a, b, each with six rows.
@@ -163,24 +165,24 @@ def _square(flat, first, width, rows, low, high, left, right, pack, out):
             a3, b3 = pack[i + np.uintp(3 * WIDE)], pack[i + np.uintp(3 * WIDE + 1)]
             a4, b4 = pack[i + np.uintp(4 * WIDE)], pack[i + np.uintp(4 * WIDE + 1)]
             a5, b5 = pack[i + np.uintp(5 * WIDE)], pack[i + np.uintp(5 * WIDE + 1)]
-            to = np.uintp((a - low) * WIDE)
+            target = np.uintp((a - low) * WIDE)
             for q in range(np.uintp(max(a - left, 0) // SIDE * SIDE), whole):
                 q0, q1 = pack[q], pack[q + np.uintp(WIDE)]
                 q2, q3 = pack[q + np.uintp(2 * WIDE)], pack[q + np.uintp(3 * WIDE)]
                 q4, q5 = pack[q + np.uintp(4 * WIDE)], pack[q + np.uintp(5 * WIDE)]
-                out[to + q] += a0 * q0 + a1 * q1 + a2 * q2 + a3 * q3 + a4 * q4 + a5 * q5
-                out[to + q + np.uintp(WIDE)] += (
+                out[target + q] += a0 * q0 + a1 * q1 + a2 * q2 + a3 * q3 + a4 * q4 + a5 * q5
+                out[target + q + np.uintp(WIDE)] += (
                     b0 * q0 + b1 * q1 + b2 * q2 + b3 * q3 + b4 * q4 + b5 * q5
                 )
 
 
-def _pack(flat, first, width, rows, n, to, pack):
+def _pack(flat, first, width, rows, n, target, pack):
     """Copy n elements of six rows to places WIDE apart; missing rows are zero."""
     for row in range(6):
-        i, at = np.uintp(to + row * WIDE), np.uintp(first + row * width)
+        i, index = np.uintp(target + row * WIDE), np.uintp(first + row * width)
         if row < rows:
             for q in range(n):
-                pack[i + q] = flat[at + q]
+                pack[i + q] = flat[index + q]
         else:
             for q in range(n):
                 pack[i + q] = 0.0
@@ -190,9 +192,9 @@ def _product(flat, first, width, errors, out):
     """Compute F'e into `out`; the rows of F begin at index `first` and are `width` apart."""
     out[:] = 0.0
     for row in range(len(errors)):
-        at, error = np.uintp(first + row * width), errors[row]
+        index, error = np.uintp(first + row * width), errors[row]
         for a in range(np.uintp(len(out))):
-            out[a] += flat[at + a] * error
+            out[a] += flat[index + a] * error
 
 
 def _add_blocks(w, jac, block, place, cuts, starts, v, wide, b):
@@ -201,13 +203,18 @@ def _add_blocks(w, jac, block, place, cuts, starts, v, wide, b):
     spare = starts[-1]
     for i in range(n):
         o = block[i]
-        before, length = 2 * starts[o], np.uintp(starts[o + 1] - starts[o])
+        wide_start, length = 2 * starts[o], np.uintp(starts[o + 1] - starts[o])
         for row in range(0, m, 2):  # two rows: the coordinates of an image point, most of the work
             x = min(row + 1, m - 1)
             # An odd number of rows: the last row is paired with itself, with weight zero.
-            both = 1.0 if x > row else 0.0
+            pair_weight = 1.0 if x > row else 0.0
             e0, e1, e2, r = jac[i, row, 0], jac[i, row, 1], jac[i, row, 2], w[i, row]
-            d0, d1, d2, s = both * jac[i, x, 0], both * jac[i, x, 1], both * jac[i, x, 2], w[i, x]
+            d0, d1, d2, s = (
+                pair_weight * jac[i, x, 0],
+                pair_weight * jac[i, x, 1],
+                pair_weight * jac[i, x, 2],
+                w[i, x],
+            )
             b[o, 0] += e0 * r + d0 * s
             b[o, 1] += e1 * r + d1 * s
             b[o, 2] += e2 * r + d2 * s
@@ -221,26 +228,26 @@ def _add_blocks(w, jac, block, place, cuts, starts, v, wide, b):
                 # A fixed unknown has no place in the wide part.
                 if place[i, run] == spare:
                     continue
-                to = np.uintp(before + place[i, run])
+                index = np.uintp(wide_start + place[i, run])
                 for a in range(cuts[run], cuts[run + 1]):
                     f, h = jac[i, row, 3 + a], jac[i, x, 3 + a]
-                    wide[to] += f * e0 + h * d0
-                    wide[to + length] += f * e1 + h * d1
-                    wide[to + length + length] += f * e2 + h * d2
-                    to += np.uintp(1)
+                    wide[index] += f * e0 + h * d0
+                    wide[index + length] += f * e1 + h * d1
+                    wide[index + length + length] += f * e2 + h * d2
+                    index += np.uintp(1)
 
 
 def _root(v, damping, smallest):
     """Cholesky factor of a block (six elements), in place; False for an undetermined block."""
-    d1, d2, more = v[2], v[5], 1.0 + damping
-    q0 = v[0] * more
+    d1, d2, growth = v[2], v[5], 1.0 + damping
+    q0 = v[0] * growth
     l00 = np.sqrt(q0)
     l10, l20 = v[1] / l00, v[3] / l00
-    q1 = d1 * more - l10 * l10
+    q1 = d1 * growth - l10 * l10
     # max avoids the root of a negative pivot, which the test below rejects.
     l11 = np.sqrt(max(q1, 0.0))
     l21 = (v[4] - l20 * l10) / l11
-    q2 = d2 * more - l20 * l20 - l21 * l21
+    q2 = d2 * growth - l20 * l20 - l21 * l21
     # Pivots relative to their diagonal element; NaN also fails.
     if not (q0 > 0.0 and q1 > smallest * d1 and q2 > smallest * d2):
         return False
@@ -325,12 +332,12 @@ def _back(v, wide, b, starts, columns, alike, reduced, out):
         for a in range(n):
             local_step[a] = reduced[columns[first + a]]
         for o in range(alike[k], alike[k + 1]):
-            at, length = np.uintp(3 * starts[o]), np.uintp(n)
+            index, length = np.uintp(3 * starts[o]), np.uintp(n)
             x0, x1, x2 = b[o, 0], b[o, 1], b[o, 2]
             for a in range(length):
-                x0 += wide[at + a] * local_step[a]
-                x1 += wide[at + length + a] * local_step[a]
-                x2 += wide[at + length + length + a] * local_step[a]
+                x0 += wide[index + a] * local_step[a]
+                x1 += wide[index + length + a] * local_step[a]
+                x2 += wide[index + length + length + a] * local_step[a]
             # Back substitution with L', from the last unknown to the first.
             x2 = x2 / v[o, 5]
             x1 = (x1 - v[o, 4] * x2) / v[o, 2]
@@ -358,8 +365,8 @@ def _through(v, wide, starts, columns, unknowns, reduced, out):
         r0, r1, r2 = root[0, axis], root[1, axis], root[2, axis]
         first, n = starts[o], starts[o + 1] - starts[o]
         for a in range(n):
-            at = 3 * first + a
-            change = r0 * wide[at] + r1 * wide[at + n] + r2 * wide[at + 2 * n]
+            index = 3 * first + a
+            change = r0 * wide[index] + r1 * wide[index + n] + r2 * wide[index + 2 * n]
             out[i, columns[first + a]] = -change
 
 
@@ -385,9 +392,9 @@ def _among(inverse, columns, runs, first, q):
     for a in range(len(columns)):
         line = inverse[columns[a]]
         for run in range(len(runs) - 1):
-            to, by = runs[run] - first, columns[runs[run] - first]
+            target, source = runs[run] - first, columns[runs[run] - first]
             for step in range(runs[run + 1] - runs[run]):
-                q[a, to + step] = line[by + step]
+                q[a, target + step] = line[source + step]
 
 
 def _cofactors(v, wide, starts, columns, runs, ends, alike, inverse, cross, out):
@@ -397,20 +404,20 @@ def _cofactors(v, wide, starts, columns, runs, ends, alike, inverse, cross, out)
     """
     longest, most = _sizes(starts, alike)
     square, root = np.empty(longest * longest), np.zeros((3, 3))
-    left, right = np.empty(3 * most * longest), np.empty(3 * most * longest)
+    z_store, x_store = np.empty(3 * most * longest), np.empty(3 * most * longest)
     for k in range(len(alike) - 1):
         begin, end, first = alike[k], alike[k + 1], starts[alike[k]]
         n, rows = starts[begin + 1] - first, 3 * (end - begin)
         q = square[: n * n].reshape((n, n))
-        z, x = left[: rows * n].reshape((rows, n)), right[: rows * n].reshape((rows, n))
+        z, x = z_store[: rows * n].reshape((rows, n)), x_store[: rows * n].reshape((rows, n))
         edges = ends[runs[begin] : runs[begin + 1] + 1]
         _among(inverse, columns[first : first + n], edges, first, q)
         # Z' of all blocks of the series, so that a single product with Q is sufficient.
         for o in range(begin, end):
             _inverse_root(v[o], root)
-            i, at = 3 * (o - begin), 3 * starts[o]
+            i, index = 3 * (o - begin), 3 * starts[o]
             for a in range(n):
-                y0, y1, y2 = wide[at + a], wide[at + n + a], wide[at + 2 * n + a]
+                y0, y1, y2 = wide[index + a], wide[index + n + a], wide[index + 2 * n + a]
                 z[i, a] = root[0, 0] * y0 + root[1, 0] * y1 + root[2, 0] * y2
                 z[i + 1, a] = root[1, 1] * y1 + root[2, 1] * y2
                 z[i + 2, a] = root[2, 2] * y2

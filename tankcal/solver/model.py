@@ -216,8 +216,8 @@ class Batch:
         """Expand values (n, s) for the first columns of the runs to all columns (n, k)."""
         lengths = np.diff(self.cuts)
         # Number of each column within its run: 0, 1, 2, ...
-        within = np.arange(self.cuts[-1]) - np.repeat(self.cuts[:-1], lengths)
-        return np.repeat(first, lengths, axis=1) + within
+        offsets = np.arange(self.cuts[-1]) - np.repeat(self.cuts[:-1], lengths)
+        return np.repeat(first, lengths, axis=1) + offsets
 
     def of(self, array):
         """Part of an array (n, m) of misclosures or (n, m, K) of derivatives in this batch."""
@@ -345,17 +345,17 @@ def plan(reduced, blocks, groups):
 def _structure(reduced, blocks, parts):
     """starts, columns, ends and alike of a Plan, and the places of each Batch."""
     # Mark the reduced columns that occur together with each block.
-    together = np.zeros((blocks, reduced + 1), dtype=bool)
+    occurrence = np.zeros((blocks, reduced + 1), dtype=bool)
     for _, _, _, block, cuts, first in parts:
         if block is not None:
-            _mark_columns(together, block, cuts, first)
-    together[:, reduced] = False
+            _mark_columns(occurrence, block, cuts, first)
+    occurrence[:, reduced] = False
     # Neighbouring blocks with equal columns form a series; series are joined where this saves work.
-    changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
+    changes = np.flatnonzero((occurrence[1:] != occurrence[:-1]).any(axis=1)) + 1
     alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
-    alike = series._join_series(together, alike, np.ones(reduced + 1, dtype=np.int64))
+    alike = series._join_series(occurrence, alike, np.ones(reduced + 1, dtype=np.int64))
     # Row-major positions of the marks, from which owner and column follow by division.
-    met = np.flatnonzero(together)
+    met = np.flatnonzero(occurrence)
     starts = np.searchsorted(met, np.arange(blocks + 1) * (reduced + 1))
     owner = np.repeat(np.arange(blocks, dtype=np.int32), np.diff(starts))
     columns = (met - owner * np.int64(reduced + 1)).astype(np.int32)
@@ -367,17 +367,17 @@ def _structure(reduced, blocks, parts):
     return starts, columns, ends, alike, places
 
 
-def _mark_columns(together, block, cuts, first):
+def _mark_columns(occurrence, block, cuts, first):
     """Mark (blocks, columns) where rows with a block have columns; first (n, s) of the runs."""
     for run, length in enumerate(np.diff(cuts)):
-        marks = np.zeros_like(together)
+        marks = np.zeros_like(occurrence)
         marks[block, first[:, run]] = True
         reach = 1
         while reach < length:  # doubles the marked width until the run is complete
-            more = min(reach, length - reach)
-            marks[:, more:] |= marks[:, :-more]
-            reach += more
-        together |= marks
+            width = min(reach, length - reach)
+            marks[:, width:] |= marks[:, :-width]
+            reach += width
+        occurrence |= marks
 
 
 def _structure_by_loops(reduced, blocks, parts):
@@ -387,14 +387,14 @@ def _structure_by_loops(reduced, blocks, parts):
     # Columns that always occur together form a piece, which shortens the marks.
     widths = edges[1:] - edges[:-1]
     piece_of = np.arange(len(widths)).repeat(widths)
-    together = np.zeros((blocks, len(widths)), dtype=bool)
+    occurrence = np.zeros((blocks, len(widths)), dtype=bool)
     for _, _, _, block, cuts, first in parts:
         if block is not None:
-            loops._mark(block, first, cuts, piece_of, together)
-    together[:, -1] = False  # the spare column
-    alike = loops._join_series(together, loops._list_series(together), widths)
+            loops._mark(block, first, cuts, piece_of, occurrence)
+    occurrence[:, -1] = False  # the spare column
+    alike = loops._join_series(occurrence, loops._list_series(occurrence), widths)
     starts = np.zeros(blocks + 1, dtype=int)
-    columns, ends = loops._list_columns(together, edges, alike, starts)
+    columns, ends = loops._list_columns(occurrence, edges, alike, starts)
     places = []
     for _, _, _, block, _, first in parts:
         place = None if block is None else np.empty(first.shape, dtype=np.int32)

@@ -88,13 +88,13 @@ def _add_products(place, factor, count, dense, begin, length, first, out):
     Four rows of the dense matrix are read at a time. With fewer than three rows left, the last row
     is updated repeatedly, with zero factors.
     """
-    flat, into, last = dense.reshape(dense.size), out.reshape(out.size), len(out) - 1
+    flat, flat_out, last = dense.reshape(dense.size), out.reshape(out.size), len(out) - 1
     width = out.shape[1]
     p = np.uintp(first * width + begin)
     q = np.uintp(min(first + 1, last) * width + begin)
     r = np.uintp(min(first + 2, last) * width + begin)
     for s in range(np.uintp(length)):
-        into[p + s] = into[q + s] = into[r + s] = 0.0
+        flat_out[p + s] = flat_out[q + s] = flat_out[r + s] = 0.0
     for c in range(0, count, 4):
         d0, d1 = place[c] + np.uintp(begin), place[c + 1] + np.uintp(begin)
         d2, d3 = place[c + 2] + np.uintp(begin), place[c + 3] + np.uintp(begin)
@@ -103,9 +103,9 @@ def _add_products(place, factor, count, dense, begin, length, first, out):
         z0, z1, z2, z3 = factor[2, c], factor[2, c + 1], factor[2, c + 2], factor[2, c + 3]
         for s in range(np.uintp(length)):
             e0, e1, e2, e3 = flat[d0 + s], flat[d1 + s], flat[d2 + s], flat[d3 + s]
-            into[p + s] += x0 * e0 + x1 * e1 + x2 * e2 + x3 * e3
-            into[q + s] += y0 * e0 + y1 * e1 + y2 * e2 + y3 * e3
-            into[r + s] += z0 * e0 + z1 * e1 + z2 * e2 + z3 * e3
+            flat_out[p + s] += x0 * e0 + x1 * e1 + x2 * e2 + x3 * e3
+            flat_out[q + s] += y0 * e0 + y1 * e1 + y2 * e2 + y3 * e3
+            flat_out[r + s] += z0 * e0 + z1 * e1 + z2 * e2 + z3 * e3
 
 
 def _mirror(q):

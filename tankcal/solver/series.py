@@ -20,7 +20,7 @@ COMPILED = (
 )
 
 
-def _mark(block, first, cuts, piece_of, together):
+def _mark(block, first, cuts, piece_of, occurrence):
     """Mark (blocks, pieces) where rows with a block have columns; first (n, s) of the runs.
 
     `piece_of` (columns,) contains the piece of each column.
@@ -29,7 +29,7 @@ def _mark(block, first, cuts, piece_of, together):
         for run in range(len(cuts) - 1):
             last = first[i, run] + cuts[run + 1] - cuts[run] - 1
             for piece in range(piece_of[first[i, run]], piece_of[last] + 1):
-                together[block[i], piece] = True
+                occurrence[block[i], piece] = True
 
 
 def _find_breaks(columns, spare, begins):
@@ -41,15 +41,15 @@ def _find_breaks(columns, spare, begins):
             begins[a] |= (right != columns[i, a - 1] + 1) | (right == spare)
 
 
-def _list_series(together):
+def _list_series(occurrence):
     """Begins of the series (`alike` of a Plan), from the marks (blocks, pieces)."""
-    blocks = len(together)
+    blocks = len(occurrence)
     alike, series = np.zeros(blocks + 1, dtype=np.int64), 0
     for o in range(blocks):
         differing = 0
         if o > 0:
-            for c in range(together.shape[1]):
-                differing += together[o, c] != together[o - 1, c]
+            for c in range(occurrence.shape[1]):
+                differing += occurrence[o, c] != occurrence[o - 1, c]
         if o == 0 or differing > 0:
             alike[series] = o
             series += 1
@@ -57,37 +57,37 @@ def _list_series(together):
     return alike[: series + 1].copy()
 
 
-def _join_series(together, alike, widths):
+def _join_series(occurrence, alike, widths):
     """Join series to longer series if this saves work; return their begins (`alike` of a Plan).
 
     At most TOGETHER neighbouring blocks receive the union of their columns. The additional zeros
     cost less than adding many small products to the normal equations. The marks (blocks, pieces)
     are changed in place; `widths` (pieces,) contains the number of columns of each piece.
     """
-    joined, last = np.zeros(len(together) + 1, dtype=np.int64), 0
+    joined, last = np.zeros(len(occurrence) + 1, dtype=np.int64), 0
     for k in range(len(alike) - 1):
         for begin in range(alike[k], alike[k + 1], TOGETHER):
             end, first = min(begin + TOGETHER, alike[k + 1]), joined[last]
-            both = together[first] | together[begin]
+            union = occurrence[first] | occurrence[begin]
             # Products of a series cost its blocks times its columns squared; adding the result to
             # the normal equations costs as much as LEAVING blocks.
-            work = (end - first + LEAVING) * (both * widths).sum() ** 2
-            apart = (begin - first + LEAVING) * (together[first] * widths).sum() ** 2
-            apart += (end - begin + LEAVING) * (together[begin] * widths).sum() ** 2
+            work = (end - first + LEAVING) * (union * widths).sum() ** 2
+            apart = (begin - first + LEAVING) * (occurrence[first] * widths).sum() ** 2
+            apart += (end - begin + LEAVING) * (occurrence[begin] * widths).sum() ** 2
             if begin == 0 or (end - first <= TOGETHER and work <= apart):
-                together[first] = both
+                occurrence[first] = union
             else:
                 last += 1
                 joined[last] = begin
     joined = joined[: last + 2].copy()
-    joined[-1] = len(together)
+    joined[-1] = len(occurrence)
     # All blocks of a series receive its columns.
     for k in range(len(joined) - 1):
-        together[joined[k] : joined[k + 1]] = together[joined[k]]
+        occurrence[joined[k] : joined[k + 1]] = occurrence[joined[k]]
     return joined
 
 
-def _list_columns(together, edges, alike, starts):
+def _list_columns(occurrence, edges, alike, starts):
     """Return `columns` and `ends` of a Plan from the marks (blocks, pieces); fill `starts`.
 
     `edges` (pieces + 1,) contains the first column of each piece, and the end.
@@ -97,7 +97,7 @@ def _list_columns(together, edges, alike, starts):
     for k in range(len(alike) - 1):
         count = 0
         for piece in range(pieces):
-            if together[alike[k], piece]:
+            if occurrence[alike[k], piece]:
                 count += edges[piece + 1] - edges[piece]
         for o in range(alike[k], alike[k + 1]):
             starts[o + 1] = starts[o] + count
@@ -106,23 +106,23 @@ def _list_columns(together, edges, alike, starts):
     # Second pass: the columns and runs of the first block of a series are repeated for its other
     # blocks.
     for k in range(len(alike) - 1):
-        first, others = starts[alike[k]], alike[k + 1] - alike[k] - 1
-        at, last, before = first, -2, runs
+        first, repeats = starts[alike[k]], alike[k + 1] - alike[k] - 1
+        index, last, first_run = first, -2, runs
         for piece in range(pieces):
-            if not together[alike[k], piece]:
+            if not occurrence[alike[k], piece]:
                 continue
             if edges[piece] != last + 1:
-                ends[runs] = at
+                ends[runs] = index
                 runs += 1
             for c in range(edges[piece], edges[piece + 1]):
-                columns[at] = c
-                at, last = at + 1, c
-        length, count = at - first, runs - before
-        for a in range(at, at + others * length):
+                columns[index] = c
+                index, last = index + 1, c
+        length, count = index - first, runs - first_run
+        for a in range(index, index + repeats * length):
             columns[a] = columns[a - length]
-        for run in range(runs, runs + others * count):
+        for run in range(runs, runs + repeats * count):
             ends[run] = ends[run - count] + length
-        runs += others * count
+        runs += repeats * count
     ends[runs] = starts[-1]
     return columns, ends[: runs + 1].copy()
 

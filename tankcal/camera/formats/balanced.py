@@ -114,6 +114,7 @@ def to_balanced(camera, radius_mm, convention="distortion_of_ideal", covariance=
         camera.interior, camera.form, form, camera.size_px, camera.pixel_mm, USUAL, covariance
     )
     values = {key: float(converted.interior[place]) for key, place in PLACES.items()}
+    # The radius is not part of the fitted parameters.
     values |= {"Ck": -values["Ck"], "R0": float(radius_mm)}
     ordered = {key: values[key] for key in KEYS}
     return Balanced(ordered, convention, converted.error_px, converted.covariance)

@@ -136,6 +136,7 @@ def parse(text, notes):
         if camera is None:
             continue
         name = notes.name(words[0], row, "CAMERA_ID")
+        # A repeated camera is reported, but kept, so that all problems are found.
         if name in [other for other, _ in cameras]:
             notes.tell(
                 message(

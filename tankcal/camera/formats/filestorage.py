@@ -45,6 +45,7 @@ def parse(text, notes):
     tuple or None
         OpenCV camera, and (columns, lines) or None.
     """
+    # The first character distinguishes JSON, XML and YAML.
     parsers = {"{": _parse_json, "<": _parse_xml}
     nodes = parsers.get(text.lstrip()[:1], _parse_yaml)(text, notes)
     if nodes is None or notes.problems:
@@ -61,6 +62,7 @@ def parse(text, notes):
     size = _read_size(nodes, notes)
     if matrix is not None:
         _check_matrix(matrix, notes)
+    # OpenCV defines these numbers of coefficients only.
     if coefficients is not None and coefficients.size not in COUNTS:
         expected = message(
             "convert_coefficients",
@@ -89,6 +91,7 @@ def _check_matrix(matrix, notes):
             ),
             key="camera_matrix",
         )
+    # The last row and the element below fx are fixed in a camera matrix.
     if low != 0 or tuple(last) != (0, 0, 1):
         notes.tell(
             message("convert_matrix_rows", "expected the rows fx 0 cx, 0 fy cy, 0 0 1"),
@@ -142,6 +145,7 @@ def _read_array(nodes, names, notes):
         )
         return None
     shape = None
+    # A FileStorage matrix with rows, cols and data.
     if isinstance(node, dict):
         shape = [node.get("rows"), node.get("cols")]
         node = node.get("data")
@@ -252,6 +256,7 @@ def _parse_yaml(text, notes):
         mapping = nodes if indent == 0 or parent is None else parent
         if key in mapping:
             notes.tell(given_twice(), number, short_text(key))
+        # A key without a value starts a node; its indented keys follow.
         is_node = isinstance(value, str) and (value == "" or value.startswith("!!opencv-matrix"))
         mapping[key] = {} if is_node and indent == 0 else value
         if indent == 0:
@@ -288,6 +293,7 @@ def _parse_list(value, number, key, notes):
         text = message("convert_endless_list", "a list without end; is the file complete?")
         notes.tell(text, number, short_text(key))
         return None
+    # Brackets of nested lists become separators.
     content = re.sub(r"\]\s*,?\s*\[", ", " if "," in value else " ", value[1:-1]).strip("[] ")
     if "," not in content:
         return content.split()

@@ -161,12 +161,14 @@ def parse(text, notes):
         )
         notes.tell(expected, key=next(key for key in OLD if key in found))
         return None
+    # Values that are missing or wrong are replaced, so that all problems are found in one run.
     size = tuple(_read_required(found, key, notes.count, notes) for key in ("width", "height"))
     f = _read_required(
         found, "f", lambda text_of_f, key: notes.number(text_of_f, key=key, above=0), notes
     )
     terms = [notes.number(found[key], key=key) if key in found else 0.0 for key in TERMS]
     camera = Metashape(size, f, *terms[:4], tuple(terms[4:8]), tuple(terms[8:]))
+    # f + B1 is the focal length in x, which must be positive.
     if f + terms[2] <= 0:
         notes.tell(
             message(

@@ -204,6 +204,7 @@ def _parse_camera(head_row, lines, notes):
 
 def frame_fits_sensor(camera, size_px):
     """Whether a frame of size_px (columns, lines) has the proportions of the sensor."""
+    # Equal proportions mean square pixels.
     width, height = camera.sensor_mm
     return abs(width * size_px[1] / (height * size_px[0]) - 1) <= SAME_SHAPE
 

@@ -102,23 +102,23 @@ def convert_camera(
     SolutionError
         If the distortion folds the image within the frame.
     """
-    given = make_framed_camera(interior, form, pixel_mm, size_px)
+    camera = make_framed_camera(interior, form, pixel_mm, size_px)
 
     def convert(values):
-        return _convert_values(values, given, to_form, used, may_turn)
+        return _convert_values(values, camera, to_form, used, may_turn)
 
-    converted, turn, is_exact = convert(given.interior)
+    converted, turn, is_exact = convert(camera.interior)
     points = frame_points(size_px)
     # Errors compare the images of equal rays.
-    rays = _rotate_rays(rays_of(given, points), turn)
+    rays = _rotate_rays(rays_of(camera, points), turn)
     distances = differences_px(
-        make_framed_camera(converted, to_form, given.pixel_mm, size_px), rays, points
+        make_framed_camera(converted, to_form, camera.pixel_mm, size_px), rays, points
     )
     rms = float(np.sqrt(np.mean(distances**2)))
     new_covariance = None
     if covariance is not None:
         new_covariance = propagate_by_differences(
-            lambda values: convert(values)[0], given.interior, covariance
+            lambda values: convert(values)[0], camera.interior, covariance
         )
     return Converted(
         converted, to_form, float(distances.max()), rms, is_exact, new_covariance, turn
@@ -148,9 +148,11 @@ def camera_in_form(camera, name, covariance=None):
     A parameter without a standard deviation is exact in the propagation, and has no standard
     deviation afterwards. See also `convert_camera`.
     """
-    known = None if covariance is None else np.nan_to_num(covariance)
+    finite_covariance = None if covariance is None else np.nan_to_num(covariance)
     to_form, frame = PUBLISHED[name], (camera.size_px, camera.pixel_mm)
-    converted = convert_camera(camera.interior, camera.form, to_form, *frame, covariance=known)
+    converted = convert_camera(
+        camera.interior, camera.form, to_form, *frame, covariance=finite_covariance
+    )
     changed = replace(
         camera, interior=converted.interior, form=converted.form, error_px=converted.error_px
     )
@@ -261,22 +263,22 @@ def _standard_deviations(covariance, count):
     return np.sqrt(np.diag(covariance))
 
 
-def _convert_values(values, given, to_form, used, may_turn):
+def _convert_values(values, camera, to_form, used, may_turn):
     """Converted interior parameters, rotation (rad), and whether the conversion is exact."""
     excluded = [i for i, name in enumerate(PARAMETERS) if used is not None and name not in used]
-    exact = _convert_exactly(values, given.form, to_form)
+    exact = _convert_exactly(values, camera.form, to_form)
     if exact is not None and not np.any(exact[excluded]):
         return exact, 0.0, True
-    source = make_framed_camera(values, given.form, given.pixel_mm, given.size_px)
-    points = frame_points(given.size_px)
-    image_mm = pixels_to_mm(points, given.pixel_mm, given.size_px)
+    source = make_framed_camera(values, camera.form, camera.pixel_mm, camera.size_px)
+    points = frame_points(camera.size_px)
+    image_mm = pixels_to_mm(points, camera.pixel_mm, camera.size_px)
     names = tuple(used) if used is not None else _usual_names(values)
-    start = _first_values(values, given.form, to_form)
+    start = _first_values(values, camera.form, to_form)
     start[excluded] = 0.0
     # The fit uses the form without a balance; balancing afterwards is exact.
     plain = Form(to_form.convention, to_form.affinity)
     extras = ("turn",) if may_turn else ()
-    result = fit(rays_of(source, points), image_mm, given.pixel_mm, plain, start, names, extras)
+    result = fit(rays_of(source, points), image_mm, camera.pixel_mm, plain, start, names, extras)
     return (
         balanced_about(result.interior, plain, to_form.radial_balance_mm)[0],
         result.turn_rad,

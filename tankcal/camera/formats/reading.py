@@ -81,6 +81,7 @@ def cameras_of(text, file, kind=None, pixel_um=None, size_px=None):
     kind = kind or _recognise_kind(text, notes)
     notes.stop()
     parsed = _PARSERS[kind](text, notes, file, size_px)
+    # Only files of Pix4D and AICON can determine the size of a pixel.
     needs_pixel = kind not in ("pix4d", "aicon")
     if needs_pixel and pixel_um is None:
         expected = message(
@@ -179,6 +180,7 @@ def _read_text(path, notes):
 
 def _recognise_kind(text, notes):
     """Kind of a text, or None; a problem is added to `notes`."""
+    # The beginning of the file is sufficient, and limits the search.
     start = text.lstrip()[:2000]
     lines = [line.split() for line in text.splitlines()[:200]]
     words = [line[0] for line in lines if line and not line[0].startswith("#")]
@@ -190,6 +192,7 @@ def _recognise_kind(text, notes):
         return "pix4d"
     if "Ck" in words:
         return "aicon"
+    # A line of cameras.txt: CAMERA_ID MODEL WIDTH ...
     if any(len(line) > 3 and line[1].isupper() and line[2].isdecimal() for line in lines) or (
         "CAMERA_ID" in start
     ):
@@ -243,6 +246,7 @@ def _read_pix4d(text, notes, _file, size_px):
         return convert
 
     cameras = pix4d.parse(text, notes)
+    # The file contains the sensor in mm, but no columns and lines.
     if size_px is None:
         _resolve_size(None, None, notes)
     for name, camera in cameras:
@@ -278,6 +282,7 @@ def _read_balanced(text, notes, file, size_px):
             ),
             key="format_width",
         )
+    # A film has no pixels, so that both statements contradict each other.
     if len(film_mm) == 2 and len(frame) > 2:
         notes.tell(
             message(
@@ -292,6 +297,7 @@ def _read_balanced(text, notes, file, size_px):
         (frame["columns"], frame["lines"]) if {"columns", "lines"} <= set(frame) else None
     )
     size = _resolve_size(size_in_file, size_px, notes)
+    # A single side of a pixel leaves the other side undefined.
     sides = [frame[key] for key in ("pixel_width", "pixel_height") if key in frame]
     if len(sides) == 1:
         notes.tell(
@@ -325,6 +331,7 @@ def _film_converter(camera, film_mm):
     def convert(pixel_mm):
         if pixel_mm is None:
             return balanced.film_from_balanced(camera, film_mm)
+        # Scanned film: the number of pixels follows from the format.
         size_px = [max(2, round(side / pixel_mm)) for side in film_mm]
         return balanced.from_balanced(camera, pixel_mm, size_px)
 
@@ -359,6 +366,7 @@ def _resolve_size(size_in_file, given_size, notes):
 
 def _refuse_other_pixel(of_file_mm, given_mm):
     """Raise SolutionError if the pixel in the file and the given pixel differ."""
+    # A given pixel only confirms the value in the file.
     if given_mm is not None and abs(of_file_mm / given_mm - 1) > SAME_PIXEL:
         raise SolutionError(
             message(

@@ -54,9 +54,11 @@ class Notes:
         float
         """
         try:
+            # bool is a subclass of int, but no number here.
             value = math.nan if isinstance(text, bool) else float(text)
         except (TypeError, ValueError, OverflowError):
             value = math.nan
+        # Python accepts "1_000" as a number; camera files do not.
         if not math.isfinite(value) or (isinstance(text, str) and "_" in text):
             self.tell(
                 message(
@@ -168,6 +170,7 @@ def short_text(value):
 
 def only_letters(text, instead="camera"):
     """Valid name derived from a file name, or `instead` if no valid character remains."""
+    # Characters outside the rules for names become underscores.
     name = re.sub(r"[^\w .()/#-]", "_", text).strip(" ._-()/#")[:MAX_NAME]
     return name or instead
 

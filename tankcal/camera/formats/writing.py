@@ -65,6 +65,7 @@ def cameras_toml_entry(name, interior, form, size_px, pixel_mm, sds=None, film_m
     lines = [f"[cameras.{_quote_name(name)}]", *frame]
     for place, parameter in enumerate(PARAMETERS):
         sd = np.nan if sds is None else float(sds[place])
+        # c, x0 and y0 are always written.
         if place < 3 or interior[place] or np.isfinite(sd):
             lines.append(f"{value_key(parameter)} = {exact_text(interior[place])}")
         if np.isfinite(sd):
@@ -78,6 +79,7 @@ def cameras_toml_entry(name, interior, form, size_px, pixel_mm, sds=None, film_m
 def _frame_lines(size_px, pixel_mm):
     """Lines that describe the frame of a camera with pixels."""
     width, height = np.broadcast_to(pixel_mm, 2)
+    # A single number for square pixels, else width and height.
     sizes = (
         [_format_micrometres(width)]
         if width == height
@@ -130,6 +132,7 @@ def _quote_name(name):
                 ),
             )
         )
+    # TOML requires quotes for names with spaces and other characters.
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else f'"{name}"'
 
 
@@ -199,6 +202,7 @@ def write_camera(kind, cameras, sds=None, radius_mm=0.0, file="cameras"):
                 form=kind,
             )
         raise InputError(Problem("cameras", expected))
+    # The nominal pixels of a film must not be written as real pixels.
     if kind not in IN_MM:
         _refuse_film(kind, cameras, file)
     if kind == "cameras.toml":

@@ -228,10 +228,10 @@ def _correct_levels(values, control_sample, levels, probability):
             len(linear) + 1 / 3
         )
         middle = np.argmin(np.abs(tails[inside] - (1 - probability) / 2))
-        below = values <= np.quantile(values, levels[side][(LEVELS - 1) // 2])
+        is_below = values <= np.quantile(values, levels[side][(LEVELS - 1) // 2])
         linear_below = linear <= quantile_values[middle]
         spread = observed[middle] * (1 - observed[middle])
-        joint = np.mean(below & linear_below) - np.mean(below) * observed[middle]
+        joint = np.mean(is_below & linear_below) - np.mean(is_below) * observed[middle]
         # beta: regression of the indicator V <= V_p on the indicator L <= L_p.
         factor = joint / spread if spread > 0 else 0.0
         corrected[side] = levels[side]

@@ -223,6 +223,7 @@ def simulation(goal, estimates, errors, draws, controlled):
 
 def _tolerance(goal, estimates):
     """Numerical tolerance of u; for an infinite u, derived from the width of the interval."""
+    # u is infinite for Student's t with two degrees of freedom or fewer.
     u, low, high = estimates[1:4]
     # Standard deviation of a normal distribution with an interval of equal width.
     spread = (high - low) / (-2 * ndtri(goal.tail))

@@ -102,12 +102,12 @@ class Shape:
         # The long table is computed only if a row needs it.
         if most >= len(self._steps) and len(self._phi) < LONG:
             self._tabulate(LONG)
-        left = place.astype(np.intp)
-        value = self._steps.take(left, mode="clip")
-        value *= np.subtract(place, left, out=place)
-        value += self._phi.take(left, mode="clip")
+        index = place.astype(np.intp)
+        value = self._steps.take(index, mode="clip")
+        value *= np.subtract(place, index, out=place)
+        value += self._phi.take(index, mode="clip")
         if most >= len(self._steps):
-            value[left >= len(self._steps)] = 0.0
+            value[index >= len(self._steps)] = 0.0
         return value
 
 
@@ -241,7 +241,7 @@ class _Sums:
         self.scale, self.spacing = self.scale[chosen], self.spacing[chosen]
         self.phi = self.phi[:, :, chosen]
 
-    def at(self, y):
+    def evaluate(self, y):
         """Distribution function and density at values y (rows,) in units of the scale.
 
         Both sums use Clenshaw's recurrence b_k = phi_k + 2 cos(a) b_k+1 - b_k+2 with a = y spacing.
@@ -271,7 +271,7 @@ class _Sums:
             low, high = -half, half.copy()
             y = np.clip(np.full(len(scale), ndtri(level)), -0.9 * half, 0.9 * half)
             for _ in range(60):
-                cdf, slope = self.at(y)
+                cdf, slope = self.evaluate(y)
                 low, high = np.where(cdf < level, y, low), np.where(cdf < level, high, y)
                 step = np.divide(level - cdf, slope, out=np.full_like(y, np.nan), where=slope > 0)
                 # A Newton step that leaves the bracket is replaced by bisection.

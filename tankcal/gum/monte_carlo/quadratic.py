@@ -115,15 +115,15 @@ class Lines:
     """
 
     def __init__(self, rows, normal, shapes, scale):
-        others = np.flatnonzero(~normal)
-        sizes = np.abs(rows.jacobian[:, others]) * scale[others]
+        other_inputs = np.flatnonzero(~normal)
+        sizes = np.abs(rows.jacobian[:, other_inputs]) * scale[other_inputs]
         normals = rows.jacobian[:, normal]
         normal_norm = np.linalg.norm(normals, axis=1)
         # The direction with the largest share of the linear part.
         along_normals = normal_norm >= np.max(sizes, axis=1, initial=0.0)
         single_rows = np.flatnonzero(~along_normals)
         largest_input = (
-            others[np.argmax(sizes[single_rows], axis=1)] if len(single_rows) else single_rows
+            other_inputs[np.argmax(sizes[single_rows], axis=1)] if len(single_rows) else single_rows
         )
         self.along = np.full(len(normal_norm), -1)
         self.along[single_rows] = largest_input

@@ -81,7 +81,7 @@ def table_estimates(model, ready, goal, progress):
     estimates[2:, sound], errors[2:, sound] = rows.value[sound], 0.0
     plain = _plain_errors(goal, rows, ready, shapes, law)
     while len(pending) and count <= MOST:
-        ends, steady = ends_of_rows.of(pending, count)
+        ends, steady = ends_of_rows.find_ends(pending, count)
         estimates[2:, pending], errors[2:, pending] = _mean_and_error(ends)
         part = estimates[:, pending], errors[:, pending], plain[:, pending]
         # A row that is valid with 8 points may prove invalid with more points.
@@ -186,7 +186,7 @@ class _Ends:
         self.sets, self.forms = sets, forms
         self.score = ndtri(levels)
 
-    def of(self, rows, count):
+    def find_ends(self, rows, count):
         """Ends (sets, 4, rows) from `count` points of every set, and mask of the steady rows.
 
         The ends of other rows are nan.
@@ -257,19 +257,22 @@ class _Ends:
         within : ndarray of bool, shape (sets, block)
             True if the shortest interval lies within the levels.
         """
-        below, above = _fit_parabolas(score[:3], target[:3]), _fit_parabolas(score[3:], target[3:])
-        lower = [below(score_value) for score_value in self.score[:3]]
-        upper = [above(score_value) for score_value in self.score[3:]]
+        lower_end, upper_end = (
+            _fit_parabolas(score[:3], target[:3]),
+            _fit_parabolas(score[3:], target[3:]),
+        )
+        lower = [lower_end(score_value) for score_value in self.score[:3]]
+        upper = [upper_end(score_value) for score_value in self.score[3:]]
         first, second, third = (high - low for low, high in zip(lower, upper, strict=True))
         # The shortest length is the minimum of a parabola through the lengths at three lower
         # levels.
         curve = first - 2 * second + third
         offset = np.divide(first - third, 2 * curve, out=np.full_like(curve, 2.0), where=curve > 0)
-        within = np.abs(offset) <= 1
+        is_within = np.abs(offset) <= 1
         tail = self.levels[1] * (1 + (SIDES[2] - 1) * np.clip(offset, -1, 1))
         high = 1 - 2 * self.levels[1] + tail
-        shortest = below(ndtri(tail)), above(ndtri(high))
-        return np.stack([lower[1], upper[1], *shortest]), within
+        shortest = lower_end(ndtri(tail)), upper_end(ndtri(high))
+        return np.stack([lower[1], upper[1], *shortest]), is_within
 
 
 def _scores_near(levels, p):
@@ -297,4 +300,4 @@ def _fit_parabolas(x, y):
     # Divided differences, Newton's form.
     first, second = (y[1] - y[0]) / (b - a), (y[2] - y[1]) / (c - b)
     bend = (second - first) / (c - a)
-    return lambda at: y[0] + (at - a) * (first + (at - b) * bend)
+    return lambda position: y[0] + (position - a) * (first + (position - b) * bend)

@@ -53,9 +53,9 @@ def sobol_points(count, inputs, seed):
         return qmc.Sobol(inputs, rng=np.random.default_rng(seed)).random(count)
     random = np.random.default_rng(seed).spawn(1)[0]  # like SciPy
     shift = random.integers(2, size=(inputs, BITS), dtype=np.uint32) @ WEIGHTS[::-1]
-    below = np.tril(random.integers(2, size=(inputs, BITS, BITS), dtype=np.uint32), -1)
+    lower_triangle = np.tril(random.integers(2, size=(inputs, BITS, BITS), dtype=np.uint32), -1)
     # Matousek's scrambling: each digit plus a random sum of the digits before it.
-    scrambled = ((below + np.eye(BITS)) @ _directions(inputs)).astype(np.int64) & 1
+    scrambled = ((lower_triangle + np.eye(BITS)) @ _directions(inputs)).astype(np.int64) & 1
     numbers = np.vstack([shift, (WEIGHTS @ scrambled).T]).astype(np.int64)
     # In the order of the Gray code, neighbouring points differ by one direction number.
     place = np.arange(1, count)
