@@ -173,10 +173,9 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
     x = np.array(unknowns, dtype=float)
     l = np.asarray(observations, dtype=float)
     v, largest_step = np.zeros_like(l), np.inf
-    # Observations without variance stay fixed; the smallest float avoids a division by zero where
-    # steps are measured in standard deviations.
     q = scipy.sparse.diags_array(covariance) if np.ndim(covariance) == 1 else covariance
     variances = np.einsum("kii->ki", q).ravel() if np.ndim(q) == 3 else q.diagonal()
+    # A fixed observation has the variance 0; the smallest float avoids a division by zero.
     sd = np.sqrt(np.maximum(variances, np.finfo(float).tiny))
     # M = Q in a Gauss-Markov model, so that a single factor serves all iterations.
     weight_whitener = cache(lambda: _whitener(q))
@@ -203,14 +202,14 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
         step, inverse, basis = _solve(aw, ww)
         x = x + step
         normalised = ww + aw @ step
-        # v = -Q B' M^-1 (A dx + w); the whitened sum enters twice, by L^-1 and by L^-T.
+        # v = -Q B' M^-1 (A dx + w), with M^-1 applied as L^-T L^-1.
         previous_v, v = v, minus_qb @ whiten(normalised, transposed=True)
         # The length of a whitened column is the inverse of the standard deviation that the unknown
         # would have on its own.
         unknown_steps = np.abs(step) * np.linalg.norm(aw, axis=0)
         steps_in_sd = np.concatenate([unknown_steps, np.abs(v - previous_v) / sd])
         previous_step, largest_step = largest_step, steps_in_sd.max(initial=0.0)
-        # Rounding in the rows adds up with the square root of their number.
+        # The length of a column grows with the square root of the number of rows.
         limit = tolerance * len(w) ** 0.5
         only_rounding_left = largest_step > previous_step / 2 and largest_step < 1e4 * limit
         if largest_step <= limit or only_rounding_left:

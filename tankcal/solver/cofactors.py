@@ -197,8 +197,8 @@ class Cofactors:
         # The unknowns are functions of the reduced unknowns plus an independent part of their
         # block, so that Q = P S^-1 P' + V^-1 within a block.
         propagation = through_reduced(self.plan, normals, columns)
-        # Many unknowns: P is sparse, and S^-1 is computed once. Few unknowns: (L^-1 D P')'(L^-1 D
-        # P') needs no inverse.
+        # Many unknowns: the sparse product P S^-1 P'. Few unknowns: the sum of squares of
+        # L^-1 D P', which needs no inverse.
         if len(columns) >= self.plan.reduced and is_worth_compiling(self.plan.rows):
             q = propagate_cofactors(np.ascontiguousarray(propagation.T), self.reduced_cofactors)
         else:

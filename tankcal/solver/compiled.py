@@ -192,7 +192,7 @@ def _open_package_cache(function):
 
     The cache directory chosen by numba may be the same, but only if it is writable.
     """
-    # These classes are internal to numba: without them only the user cache is used.
+    # These classes are internal to numba: without them only the cache chosen by numba is used.
     try:
         from numba.core import caching
 

@@ -181,10 +181,10 @@ def _restore_unknown(new_covariance, camera, values, covariance):
     is_open = np.isnan(variances) | (variances == 0)
     # Effect of each open standard deviation on the image.
     sds = np.sqrt(np.where(is_open, np.maximum(np.diag(new_covariance), 0.0), 0.0))
-    is_felt = _effect_px(camera, sds) > SAME_POINT_PX
-    result = np.where(is_open & ~is_felt, 0.0, new_covariance)
-    result = np.where((is_open & ~is_felt)[:, None], 0.0, result)
-    is_unknown = np.isnan(variances) & ((values != 0) | ~is_felt)
+    has_effect = _effect_px(camera, sds) > SAME_POINT_PX
+    result = np.where(is_open & ~has_effect, 0.0, new_covariance)
+    result = np.where((is_open & ~has_effect)[:, None], 0.0, result)
+    is_unknown = np.isnan(variances) & ((values != 0) | ~has_effect)
     return result + np.diag(np.where(is_unknown, np.nan, 0.0))
 
 
