@@ -1,14 +1,16 @@
-"""Least squares that knows no geometry: the combined (Gauss-Helmert) model.
+"""Least-squares adjustment without geometry: the combined (Gauss-Helmert) model.
 
-Conditions f(x, l + v) = 0 between unknowns x and observations l with covariance Q, linearised in
-each iteration at the adjusted observations:
+The conditions f(x, l + v) = 0 relate the unknowns x to the observations l with covariance Q. Each
+iteration linearises them at the adjusted observations:
 
     B v + A dx + w = 0,   M = B Q B',   dx = -(A' M^-1 A)^-1 A' M^-1 w,   v = -Q B' M^-1 (A dx + w)
 
-A model without B is a Gauss-Markov model, f = F(x) - l and B = -I. Everything is whitened with a
-Cholesky factor, and columns are scaled: those that are well apart are solved by normal equations,
-others by QR, which judges the rank. Nothing else is inverted but the covariance. Source: Mikhail &
-Ackermann 1976, Observations and Least Squares, ch. 9.
+A model without B is a Gauss-Markov model: f = F(x) - l and B = -I. All rows are whitened with a
+Cholesky factor, and the columns are scaled to length one. Well-conditioned columns are solved by
+normal equations. All other systems are solved by QR, which also determines the rank. Only the
+covariance is inverted.
+
+Source: Mikhail & Ackermann 1976, Observations and Least Squares, ch. 9.
 """
 
 from dataclasses import dataclass
@@ -23,49 +25,73 @@ from scipy.special import ndtri
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
-ALPHA, POWER = 0.001, 0.80  # of every test of single readings, and of the blunder it can show
-CRITICAL = 3.29  # of a test statistic: ALPHA, two-sided normal, to the digits of the field
-UNCONTROLLED = 1e-6  # a redundancy number below it is zero: the observation cannot be checked
-WELL_PLACED = 1e-3  # pivot of those that loses three digits of sixteen: above it they will do
-TIED = 9  # digits of test statistics: two readings that control each other alone differ by rounding
-SMALLEST_PIVOT = 1e-12  # of normal equations with ones in the diagonal: below it is rounding
+ALPHA, POWER = 0.001, 0.80  # of the test of a single reading, and of its detectable blunder
+CRITICAL = 3.29  # critical value of the statistic: two-sided normal, ALPHA, as rounded in practice
+UNCONTROLLED = 1e-6  # redundancy number below which an observation counts as uncontrolled
+WELL_PLACED = 1e-3  # squared pivot, scaled columns: normal equations lose three of sixteen digits
+TIED = (
+    9  # decimals of compared statistics: two readings with only mutual control tie but for rounding
+)
+SMALLEST_PIVOT = 1e-12  # squared pivot of normal equations with unit diagonal; rounding below it
 
 
 def noncentrality(alpha=ALPHA, power=POWER):
-    """delta0 of a two-sided test of the normal distribution; 4.13 for 0.001 and 0.80."""
+    """Noncentrality delta0 of a two-sided test of the normal distribution.
+
+    Parameters
+    ----------
+    alpha : float, optional
+        Probability of rejecting a valid observation.
+    power : float, optional
+        Probability of detecting a blunder of size delta0.
+
+    Returns
+    -------
+    float
+        delta0, in standard deviations of the tested quantity.
+
+    Notes
+    -----
+    delta0 = z(1 - alpha/2) + z(power), with z the quantile of the standard normal distribution.
+
+    Examples
+    --------
+    >>> round(noncentrality(0.001, 0.80), 2)
+    4.13
+    """
     return float(ndtri(1 - alpha / 2) + ndtri(power))
 
 
 @dataclass(frozen=True)
 class Adjustment:
-    """What any adjustment found: of `adjust` here, or with blocks eliminated (tankcal.solver).
+    """Result of an adjustment, by `adjust` or with eliminated blocks (tankcal.solver).
 
     Attributes
     ----------
     unknowns : ndarray, shape (u,)
-        Estimates, in the model's units; of a solver.Model its state.
+        Estimates, in the units of the model. For a solver.Model, its state.
     cofactor : ndarray, shape (u, u)
-        Covariance of the unknowns for variance factor 1; of a solver.Model the solver.Cofactors
-        that works it out for any unknowns and any functions of them.
+        Covariance of the unknowns for variance factor 1. For a solver.Model, a solver.Cofactors,
+        which computes the covariance of any unknowns and of functions of the unknowns.
     normalised : ndarray, shape (m,)
-        Whitened residual of each condition; of a solver.Model a tuple of (n, rows), computed minus
-        observed, one array a group.
+        Whitened residual of each condition. For a solver.Model, a tuple with an array (n, rows) for
+        each group, computed minus observed.
     chi2 : float
-        v' Q^-1 v.
+        Weighted sum of squared residuals, v' Q^-1 v.
     rows : int
-        Conditions that weigh anything.
+        Number of conditions with a weight.
     estimated : int
-        Unknowns, less those that exact conditions take.
+        Number of unknowns, less the number fixed by exact conditions.
     iterations : int
-        Until the last step was below the tolerance.
+        Number of iterations until the last step was below the tolerance.
     rank_defect : int
-        Directions of the unknowns that only the datum fixes.
+        Number of directions of the unknowns that only the datum fixes.
     observations, residuals : ndarray, shape (n,), or None
-        Adjusted observations l + v and v, in the units of the observations; None: the solver.Model
-        keeps its own.
+        Adjusted observations l + v and residuals v, in the units of the observations. None for a
+        solver.Model, which keeps its own observations.
     redundancy : ndarray, shape (m,), or None
-        Part of each condition's error that shows in its residual, 0 to 1; None:
-        Cofactors.redundancy works it out.
+        Redundancy number of each condition, 0 to 1: the part of an error that appears in its
+        residual. None for a solver.Model, see Cofactors.redundancy.
     """
 
     unknowns: object
@@ -82,38 +108,42 @@ class Adjustment:
 
     @property
     def dof(self):
-        """Degrees of freedom: rows minus unknowns, plus what the datum takes up."""
+        """Degrees of freedom: rows minus estimated unknowns plus rank defect."""
         return self.rows - self.estimated + self.rank_defect
 
     @property
     def variance_factor(self):
-        """A-posteriori variance factor chi2 / dof; nan when nothing is redundant."""
+        """A-posteriori variance factor chi2 / dof; nan without redundancy."""
         return self.chi2 / self.dof if self.dof > 0 else np.nan
 
     @property
     def sigma0(self):
-        """Root of the a-posteriori variance factor."""
+        """Square root of the a-posteriori variance factor."""
         return float(np.sqrt(self.variance_factor))
 
 
 def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tolerance=1e-8):
-    """Adjust observations so that the conditions of `model` hold.
+    """Adjust observations so that the conditions of a model hold.
 
     Parameters
     ----------
     model : callable
-        model(x, l) -> (w, A, B): misclosures (m,), Jacobian by unknowns (m, u) and by observations
-        (m, n), the last dense, scipy.sparse, or None for a Gauss-Markov model (w = F(x) - l).
-    unknowns : (u,) array
-        Start values.
-    observations : (n,) array
-    covariance : array or sparse matrix
-        (n,) variances, or (n, n) dense or sparse; or (m, d, d) of points, n = m d, that nothing
-        has in common: then each condition is of one of them, and the last Jacobian is (m, d).
-    max_iterations : int
-    tolerance : float
-        The largest last step of an unknown or residual, in standard deviations; a step that no
-        longer shrinks is accepted up to 1e4 times it (rounding).
+        model(x, l) -> (w, A, B): misclosures (m,), Jacobian by the unknowns (m, u) and Jacobian by
+        the observations (m, n). B is dense, scipy.sparse, or None for a Gauss-Markov model (w =
+        F(x) - l).
+    unknowns : array_like, shape (u,)
+        Start values, in the units of the model.
+    observations : array_like, shape (n,)
+        Observations, in the units of the model.
+    covariance : ndarray or sparse matrix
+        Variances (n,), or covariance (n, n), dense or sparse. Also (m, d, d) for m independent
+        points with d coordinates each, n = m d. Each condition then concerns a single point, and B
+        has the shape (m, d).
+    max_iterations : int, optional
+        Largest number of iterations.
+    tolerance : float, optional
+        Limit for the last step of each unknown and residual, in standard deviations. A step that no
+        longer shrinks is accepted up to 1e4 times the tolerance, as rounding.
 
     Returns
     -------
@@ -122,30 +152,33 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
     Raises
     ------
     SolutionError
-        When the conditions do not determine the unknowns, when there are fewer conditions than
-        unknowns, or when the iteration does not converge.
+        If the conditions do not determine the unknowns, if there are fewer conditions than
+        unknowns, or if the iteration does not converge.
 
     Examples
     --------
-    Three levelled height differences, from a bench mark by two points and back, 1 mm each:
+    Three levelled height differences with a standard uncertainty of 1 mm, from a bench mark over
+    two points and back:
 
     >>> rows = np.array([[1.0, 0.0], [-1.0, 1.0], [0.0, -1.0]])
     >>> loop = lambda x, l: (rows @ x - l, rows, None)
-    >>> done = adjust(loop, [0.0, 0.0], [1.002, 0.499, -1.507], [1e-6] * 3)
-    >>> done.unknowns.round(6)
+    >>> result = adjust(loop, [0.0, 0.0], [1.002, 0.499, -1.507], [1e-6] * 3)
+    >>> result.unknowns.round(6)
     array([1.004, 1.505])
-    >>> done.residuals.round(6)
+    >>> result.residuals.round(6)
     array([0.002, 0.002, 0.002])
-    >>> done.dof, round(done.sigma0, 3)
+    >>> result.dof, round(result.sigma0, 3)
     (1, 3.464)
     """
     x = np.array(unknowns, dtype=float)
     l = np.asarray(observations, dtype=float)
-    v, size = np.zeros_like(l), np.inf
+    v, largest_step = np.zeros_like(l), np.inf
     q = scipy.sparse.diags_array(covariance) if np.ndim(covariance) == 1 else covariance
     variances = np.einsum("kii->ki", q).ravel() if np.ndim(q) == 3 else q.diagonal()
+    # A fixed observation has the variance 0; the smallest float avoids a division by zero.
     sd = np.sqrt(np.maximum(variances, np.finfo(float).tiny))
-    by_weights = cache(lambda: _whitener(q))
+    # M = Q in a Gauss-Markov model, so that a single factor serves all iterations.
+    weight_whitener = cache(lambda: _whitener(q))
     for iteration in range(1, max_iterations + 1):
         w, a, b = model(x, l + v)
         if len(w) < len(x):
@@ -157,22 +190,29 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
                     unknowns=len(x),
                 )
             )
+        # The misclosures refer to the original observations: w(l + v) - B v, with B = -I or the
+        # Jacobian of the conditions.
         if b is None:  # B = -I
-            minus_qb, whiten, w_there = q, by_weights(), w + v
+            minus_qb, whiten, misclosures = q, weight_whitener(), w + v
         else:
-            minus_qb, whiten, bv = _of_conditions(q, b, v)
-            w_there = w - bv
-        aw, ww = whiten(a), whiten(w_there)
+            minus_qb, whiten, bv = _propagate_conditions(q, b, v)
+            misclosures = w - bv
+        aw, ww = whiten(a), whiten(misclosures)
+        # dx = -(A'M^-1 A)^-1 A'M^-1 w, from the whitened rows.
         step, inverse, basis = _solve(aw, ww)
         x = x + step
         normalised = ww + aw @ step
-        v_before, v = v, minus_qb @ whiten(normalised, transposed=True)
-        of_unknowns = np.abs(step) * np.linalg.norm(aw, axis=0)
-        moved = np.concatenate([of_unknowns, np.abs(v - v_before) / sd])
-        before, size = size, moved.max(initial=0.0)
+        # v = -Q B' M^-1 (A dx + w), with M^-1 applied as L^-T L^-1.
+        previous_v, v = v, minus_qb @ whiten(normalised, transposed=True)
+        # The length of a whitened column is the inverse of the standard deviation that the unknown
+        # would have on its own.
+        unknown_steps = np.abs(step) * np.linalg.norm(aw, axis=0)
+        steps_in_sd = np.concatenate([unknown_steps, np.abs(v - previous_v) / sd])
+        previous_step, largest_step = largest_step, steps_in_sd.max(initial=0.0)
+        # The length of a column grows with the square root of the number of rows.
         limit = tolerance * len(w) ** 0.5
-        only_rounding_left = size > before / 2 and size < 1e4 * limit
-        if size <= limit or only_rounding_left:
+        only_rounding_left = largest_step > previous_step / 2 and largest_step < 1e4 * limit
+        if largest_step <= limit or only_rounding_left:
             basis = aw @ inverse if basis is None else basis
             return Adjustment(
                 unknowns=x,
@@ -197,18 +237,19 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
 
 @dataclass(frozen=True)
 class Snooped:
-    """What data snooping left of k candidates.
+    """Result of data snooping among k candidates.
 
     Attributes
     ----------
     adjustment : Adjustment
-        The last one.
+        The final adjustment.
     statistic : ndarray, shape (k,)
-        The last test statistic of each; nan: never tested.
+        Last test statistic of each candidate; nan for an untested candidate.
     needed : ndarray of bool, shape (k,)
-        Disagrees, and was kept because something would not be determined without it.
+        True for a candidate that fails the test but is kept, because another quantity would not be
+        determined without it.
     rounds : int
-        Readjustments that were made or tried.
+        Number of readjustments, including failed attempts.
     """
 
     adjustment: object
@@ -218,28 +259,33 @@ class Snooped:
 
 
 def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=False, rounds=None):
-    """Data snooping: set aside what disagrees, the worst first; take back what agrees after all.
+    """Search for outliers by data snooping, and readmit candidates that pass the test later.
+
+    The candidate with the largest test statistic is rejected first.
 
     Parameters
     ----------
     adjustment : object
-        The first one, whatever `tests` and `readjust` understand.
+        The first adjustment, of any type accepted by `tests` and `readjust`.
     tests : callable
-        tests(adjustment) -> used (k,) bool, absolute test statistic (k,) of the candidates, nan
-        where one is not tested, and the critical value.
+        tests(adjustment) -> mask (k,) of the candidates in use, absolute test statistics (k,), and
+        the critical value. An untested candidate has the statistic nan.
     readjust : callable
-        readjust(adjustment, goes, comes) -> the adjustment when these (k,) masks are followed.
+        readjust(adjustment, rejected, readmitted) -> the adjustment after the changes in both masks
+        (k,).
     at_once : float
-        Candidates whose statistic is above this share of the largest go together.
+        Share of the largest statistic: candidates above this share are rejected together.
     returns : int
-        Times that a candidate may come back: all that agree the first time, later one by one.
+        Largest number of times that a candidate may be readmitted. The first time, all candidates
+        that pass the test are readmitted together, later only one at a time.
     choose : callable, optional
-        choose(adjustment, goes, share) -> (k,) bool, those of `goes` that do go; None: all. share
-        (k,) is that of the largest statistic, rounded so that a tie is a tie on every machine.
+        choose(adjustment, rejected, share) -> mask (k,) of the candidates that are rejected. None:
+        all candidates in `rejected`. `share` (k,) is the share of the largest statistic. It is
+        rounded, so that equal statistics compare as equal on every machine.
     keep : bool, optional
-        Whether a candidate without which a readjustment fails is kept from then on.
+        If True, a candidate is kept from then on when the readjustment fails without it.
     rounds : int, optional
-        At most so many; None: no limit.
+        Largest number of rounds; None: no limit.
 
     Returns
     -------
@@ -248,7 +294,7 @@ def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=Fa
     Raises
     ------
     SolutionError
-        When a readjustment does (unless `keep`), or when the search does not come to rest.
+        If a readjustment fails (unless `keep`), or if the search does not settle within `rounds`.
 
     References
     ----------
@@ -256,51 +302,66 @@ def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=Fa
 
     Examples
     --------
-    The mean of five readings of 1 mm, one of them wrong by 20 mm; rejected ones get no weight:
+    The mean of five readings with a standard uncertainty of 1 mm, one of them wrong by 20 mm.
+    Rejected readings get no weight:
 
     >>> readings = np.array([4.001, 4.000, 3.999, 4.020, 4.000])
     >>> def mean(used):
     ...     sd = np.where(used, 0.001, 1.0)
     ...     return used, adjust(lambda x, l: (x - l, np.ones((5, 1)), None), [4.0], readings, sd**2)
-    >>> def tests(found):
-    ...     used, fit = found
-    ...     without = np.sqrt(np.maximum(fit.redundancy, 1e-9))
-    ...     return used, np.abs(fit.residuals) / (0.001 * without), CRITICAL
-    >>> def again(found, goes, comes):
-    ...     return mean(found[0] & ~goes | comes)
-    >>> snoop(mean(np.ones(5, bool)), tests, again, at_once=0.9, returns=1).adjustment[0].tolist()
+    >>> def tests(result):
+    ...     used, fit = result
+    ...     factor = np.sqrt(np.maximum(fit.redundancy, 1e-9))
+    ...     return used, np.abs(fit.residuals) / (0.001 * factor), CRITICAL
+    >>> def readjust(result, rejected, readmitted):
+    ...     return mean(result[0] & ~rejected | readmitted)
+    >>> first = mean(np.ones(5, bool))
+    >>> snoop(first, tests, readjust, at_once=0.9, returns=1).adjustment[0].tolist()
     [True, True, True, False, True]
     """
-    few = False
-    statistic = back = needed = None
-    for tried in range(rounds) if rounds else count():
-        used, now, critical = tests(adjustment)
+    only_worst = False
+    statistic = return_counts = needed = None
+    for round_number in range(rounds) if rounds else count():
+        used, current, critical = tests(adjustment)
         if statistic is None:
-            statistic = np.full(len(now), np.nan)
-            back, needed = np.zeros(len(now), dtype=int), np.zeros(len(now), dtype=bool)
-        statistic = np.where(np.isnan(now), statistic, now)
-        off = np.where(used & ~needed & ~np.isnan(now), now, 0.0)
-        worst = off.max(initial=0.0)
-        share = np.round(off / worst, TIED) if worst > 0 else off
-        goes = (off > critical) & (share >= at_once)
-        if few:  # the first of the worst alone
-            goes &= np.arange(len(off)) == np.argmax(share)
-        comes = np.zeros(len(now), dtype=bool)
-        if goes.any():
-            goes = goes if choose is None else choose(adjustment, goes, share)
+            statistic = np.full(len(current), np.nan)
+            return_counts, needed = (
+                np.zeros(len(current), dtype=int),
+                np.zeros(len(current), dtype=bool),
+            )
+        # A candidate that is not tested in this round keeps its last statistic.
+        statistic = np.where(np.isnan(current), statistic, current)
+        tested = np.where(used & ~needed & ~np.isnan(current), current, 0.0)
+        largest = tested.max(initial=0.0)
+        # Rounded, so that a tie does not depend on the machine.
+        share = np.round(tested / largest, TIED) if largest > 0 else tested
+        rejected = (tested > critical) & (share >= at_once)
+        # After a failed readjustment only the first candidate with the largest statistic is
+        # rejected.
+        if only_worst:
+            rejected &= np.arange(len(tested)) == np.argmax(share)
+        # Candidates are readmitted only in a round without rejections: a remaining outlier distorts
+        # the statistics.
+        readmitted = np.zeros(len(current), dtype=bool)
+        if rejected.any():
+            rejected = rejected if choose is None else choose(adjustment, rejected, share)
         else:
-            comes = _coming_back(~used & (now < critical), now, back, returns)
-            back[comes] += 1
-        if not (goes.any() or comes.any()):
-            return Snooped(adjustment, statistic, needed, tried)
+            readmitted = _select_readmitted(
+                ~used & (current < critical), current, return_counts, returns
+            )
+            return_counts[readmitted] += 1
+        if not (rejected.any() or readmitted.any()):
+            return Snooped(adjustment, statistic, needed, round_number)
         try:
-            adjustment, few = readjust(adjustment, goes, comes), False
+            adjustment, only_worst = readjust(adjustment, rejected, readmitted), False
         except SolutionError:
             if not keep:
                 raise
-            if few or np.count_nonzero(goes) == 1:
-                needed |= goes
-            few = True
+            # A single rejection that fails identifies the candidate without which the unknowns are
+            # not determined.
+            if only_worst or np.count_nonzero(rejected) == 1:
+                needed |= rejected
+            only_worst = True
     raise SolutionError(
         message(
             "snooping_unsteady",
@@ -310,21 +371,18 @@ def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=Fa
     )
 
 
-def _coming_back(agrees, statistic, back, returns):
-    """Mask of what comes back: all that agrees the first time, later the one that agrees best."""
-    first = agrees & (back == 0)
-    again = np.where(agrees & (back < returns), statistic, np.inf)
-    if first.any() or not np.isfinite(again).any():
+def _select_readmitted(agrees, statistic, return_counts, returns):
+    """Mask of readmitted candidates: all at their first pass, later only the best."""
+    first = agrees & (return_counts == 0)
+    # Readmitting one candidate at a time prevents an endless exchange of two candidates.
+    candidates = np.where(agrees & (return_counts < returns), statistic, np.inf)
+    if first.any() or not np.isfinite(candidates).any():
         return first
-    return again == again.min()
+    return candidates == candidates.min()
 
 
 def find_determined(pivots, rows, of_normals=False):
-    """Which unknowns are determined, by the pivots of a factor that are more than rounding.
-
-    The one rule about rank, here and in tankcal.solver: columns are scaled to length one first;
-    then a pivot of the rows themselves (QR) must be above max(rows, k) eps of the largest, a
-    squared pivot of normal equations (Cholesky), which have lost half the digits, above 1e-12.
+    """Determine which unknowns are determined, from the pivots of a factorisation.
 
     Parameters
     ----------
@@ -333,11 +391,19 @@ def find_determined(pivots, rows, of_normals=False):
     rows : int
         Number of rows.
     of_normals : bool, optional
-        True for a Cholesky factor.
+        True for a Cholesky factor of normal equations.
 
     Returns
     -------
     ndarray of bool, shape (k,)
+        True for a pivot above rounding.
+
+    Notes
+    -----
+    This is the only rule for the rank, here and in tankcal.solver. The columns are scaled to length
+    one. A pivot of the rows (QR) must exceed max(rows, k) eps times the largest pivot. A
+    squared pivot of normal equations (Cholesky) must reach 1e-12, because squaring loses half the
+    digits.
 
     Examples
     --------
@@ -351,13 +417,14 @@ def find_determined(pivots, rows, of_normals=False):
     return pivots > limit * pivots.max(initial=0.0)
 
 
-def _of_conditions(q, b, v):
-    """-Q B', the function that multiplies by L^-1 with L L' = B Q B', and B v."""
+def _propagate_conditions(q, b, v):
+    """Return -Q B', a function that multiplies by L^-1 with L L' = B Q B', and B v."""
     if np.ndim(q) == 3:
-        own = _OwnBlocks(-np.einsum("kij,kj->ki", q, b))
+        # Independent points: M = B Q B' is diagonal, and -Q B' has d non-zero rows in each column.
+        minus_qb_blocks = _BlockColumns(-np.einsum("kij,kj->ki", q, b))
         return (
-            own,
-            _diagonal_whitener(-np.sum(b * own.rows, axis=1)),
+            minus_qb_blocks,
+            _diagonal_whitener(-np.sum(b * minus_qb_blocks.rows, axis=1)),
             np.sum(b * v.reshape(b.shape), axis=1),
         )
     minus_qb = -(q @ b.T)
@@ -365,8 +432,8 @@ def _of_conditions(q, b, v):
 
 
 @dataclass(frozen=True)
-class _OwnBlocks:
-    """A matrix (k d, k) that is zero but for d rows of each column, as (k, d)."""
+class _BlockColumns:
+    """Matrix (k d, k) with d consecutive non-zero rows in each column, stored as (k, d)."""
 
     rows: np.ndarray
 
@@ -375,9 +442,10 @@ class _OwnBlocks:
 
 
 def _whitener(m):
-    """A function that multiplies by L^-1 (or L^-T), where L L' = m."""
+    """Return a function that multiplies by L^-1 (or by L^-T), where L L' = m."""
     diagonal = m.diagonal()
     if scipy.sparse.issparse(m):
+        # A sparse matrix that is diagonal needs no factorisation.
         m = m.tocsr()
         m.eliminate_zeros()
         if m.nnz <= len(diagonal):
@@ -402,6 +470,7 @@ def _whitener(m):
 
 
 def _diagonal_whitener(diagonal):
+    """Return a function that divides by the square roots of a diagonal covariance (n,)."""
     if not np.all(diagonal > 0):
         raise SolutionError(
             message(
@@ -418,10 +487,11 @@ def _diagonal_whitener(diagonal):
 
 
 def _solve(a, w):
-    """Step, R^-1 whose square is the cofactor matrix, and A R^-1, an orthonormal basis.
+    """Solve whitened rows a (m, u), w (m,) for the step of the unknowns.
 
-    By the Cholesky factor of the normal equations where columns of length one are far from
-    depending on each other (the basis is None then: it is quickly had), else by QR.
+    Returns the step (u,), R^-1 (u, u) with cofactor matrix R^-1 R^-T, and the orthonormal basis A
+    R^-1. The basis is None after a solution by normal equations, where it is cheap to compute
+    later.
     """
     scale = np.linalg.norm(a, axis=0)
     if not np.all(np.isfinite(scale)):
@@ -431,12 +501,16 @@ def _solve(a, w):
                 "the adjustment diverged: a derivative is not finite",
             )
         )
+    # A zero column stays zero, and the rank test below rejects it.
     scale[scale == 0] = 1.0
     scaled = a / scale
-    root, wrong = scipy.linalg.lapack.dpotrf(scaled.T @ scaled, lower=True)
-    if not wrong and np.diag(root).min(initial=1.0) ** 2 > WELL_PLACED:
+    # Normal equations are used only if each squared pivot exceeds WELL_PLACED; otherwise QR
+    # preserves the digits.
+    root, info = scipy.linalg.lapack.dpotrf(scaled.T @ scaled, lower=True)
+    if not info and np.diag(root).min(initial=1.0) ** 2 > WELL_PLACED:
         inverse = scipy.linalg.lapack.dtrtri(root, lower=True)[0].T / scale[:, None]
         return -inverse @ (inverse.T @ (a.T @ w)), inverse, None
+    # Column pivoting sorts the pivots, so that the last ones reveal the rank.
     basis, r, order = scipy.linalg.qr(scaled, mode="economic", pivoting=True, check_finite=False)
     rank = int(np.sum(find_determined(np.diag(r), len(a))))
     if rank < a.shape[1]:
@@ -444,6 +518,7 @@ def _solve(a, w):
             f"rank {rank} of {a.shape[1]}: the observations do not determine unknown(s) "
             + ", ".join(str(i) for i in sorted(order[rank:]))
         )
+    # R^-1 with its rows in the original order of the unknowns, and without the column scale.
     inverse = np.empty_like(r)
     inverse[order] = scipy.linalg.solve_triangular(r, np.eye(len(r)), check_finite=False)
     inverse /= scale[:, None]

@@ -1,6 +1,7 @@
-"""The exceptions of tankcal: one small family, with numbers in the message.
+"""Exceptions of tankcal.
 
-`InputError` is the user's to mend (exit status 2), `SolutionError` is the survey's (exit status 3).
+An `InputError` (exit status 2) requires a correction of the input by the user. A `SolutionError`
+(exit status 3) means that the survey does not determine a result.
 """
 
 import errno
@@ -10,15 +11,25 @@ from math import isfinite
 
 from tankcal.messages import Message, as_plain, message, printable
 
-SHEET = "sheet "  # how the file of a problem in a workbook begins
+SHEET = "sheet "  # prefix of Problem.file for a sheet of a workbook
 
 
 def sheet_named(name):
-    """The place of a sheet, as a text that each language says in its words."""
+    """Place of a sheet as a translatable message.
+
+    Parameters
+    ----------
+    name : str
+        Name of the sheet.
+
+    Returns
+    -------
+    Message
+    """
     return message("in_sheet", "sheet {sheet}", sheet=name)
 
 
-_OF_SYSTEM = {
+_SYSTEM_MESSAGES = {
     errno.ENOENT: message("no_such_file", "No such file or directory"),
     errno.EACCES: message("permission_denied", "Permission denied"),
     errno.EPERM: message("not_permitted", "Operation not permitted"),
@@ -41,18 +52,24 @@ _OF_SYSTEM = {
 
 
 def reason_of(error):
-    """Why a file cannot be read or written, as a Message where the reason is a usual one.
+    """Reason why a file cannot be read or written.
 
     Parameters
     ----------
     error : Exception
-        An OSError, an error of the JSON or UTF-8 reader, or any other.
+        An OSError, an error of the JSON or UTF-8 decoder, or any other exception.
+
+    Returns
+    -------
+    Message or str
+        A translatable Message for common reasons, else the text of the exception.
 
     Examples
     --------
     >>> reason_of(FileNotFoundError(errno.ENOENT, "nao existe"))
     'No such file or directory'
     """
+    # Errors of the decoders carry a position in the file, which the message states.
     if isinstance(error, json.JSONDecodeError):
         return message("not_json", "not JSON: row {row}, column {column}",
                        row=str(error.lineno), column=str(error.colno))  # fmt: skip
@@ -61,18 +78,23 @@ def reason_of(error):
     if isinstance(error, RecursionError):
         return message("nested_too_deeply", "nested too deeply")
     if isinstance(error, OSError):
-        return _OF_SYSTEM.get(error.errno) or error.strerror or str(error) or type(error).__name__
+        return (
+            _SYSTEM_MESSAGES.get(error.errno)
+            or error.strerror
+            or str(error)
+            or type(error).__name__
+        )
     return str(error) or type(error).__name__
 
 
 class TankcalError(Exception):
-    """Anything that tankcal raises on purpose; `exit_status` is what the command line returns."""
+    """Base class of the exceptions of tankcal; `exit_status` is returned by the command line."""
 
     exit_status = 1
 
     @property
     def texts(self):
-        """What it says, line by line; a Message among them can be said in another language."""
+        """Lines of the error, as texts; each Message among them can be translated."""
         return self.args
 
     def __str__(self):
@@ -81,22 +103,22 @@ class TankcalError(Exception):
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong with the input, in one line.
+    """Single defect of the input, described in one line.
 
     Attributes
     ----------
     file : str
-        Name of the file or workbook sheet, as the user knows it ("points.csv").
+        Name of the file or of the sheet of a workbook, as known to the user ("points.csv").
     expected : str
-        What was found and what was expected, in plain words.
+        Description of the value found and of the value expected.
     row : int or None
-        Line of the file or row of the sheet, counted as an editor shows it (heading = 1).
+        Line of the file or row of the sheet, counted as in an editor (heading = 1).
     column : str or None
-        Heading of the column, or the key ("tank.nominal_height_m").
+        Heading of the column, or key ("tank.nominal_height_m").
     cell : str or None
-        Of a sheet ("C7"), when it is known.
+        Cell of a sheet ("C7"), if known.
     book : str or None
-        File name of the workbook that the sheet stands in.
+        File name of the workbook that contains the sheet.
 
     Examples
     --------
@@ -113,16 +135,18 @@ class Problem:
 
     @property
     def text(self):
-        """The whole line as a Message."""
+        """Complete line as a Message."""
         return message("problem", "{place}: {text}", place=self.place, text=self.expected)
 
     @property
     def place(self):
-        """Where it is, from the file to the column, as texts."""
+        """Place of the problem, from the file to the column, as a list of texts."""
+        # From the outermost to the innermost place: workbook, file or sheet, cell or row, column.
         place = [printable(self.book)] if self.book else []
         is_sheet = self.file.startswith(SHEET)
         name = self.file.removeprefix(SHEET)
         place.append(sheet_named(name) if is_sheet else printable(self.file))
+        # A cell contains its row, which is therefore not repeated.
         if self.cell is not None:
             place.append(message("in_cell", "cell {cell}", cell=self.cell))
         elif self.row is not None:
@@ -134,7 +158,18 @@ class Problem:
 
 
 def problem_of(problem):
-    """A `Problem` as plain data: place, text in English, code and values."""
+    """Convert a `Problem` to plain data for JSON.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+
+    Returns
+    -------
+    dict
+        Place, English text, message code and values.
+    """
     return {
         "book": problem.book,
         "file": problem.file,
@@ -147,16 +182,28 @@ def problem_of(problem):
 
 
 def _without_nan(plain):
-    """Plain data with null for what is no finite number, which JSON does not hold."""
+    """Replace numbers that are not finite by None, because JSON cannot represent them."""
     if isinstance(plain, dict):
-        return {name: _without_nan(one) for name, one in plain.items()}
+        return {name: _without_nan(value) for name, value in plain.items()}
     if isinstance(plain, list):
-        return [_without_nan(one) for one in plain]
+        return [_without_nan(value) for value in plain]
+    # NaN and infinity are no valid JSON.
     return None if isinstance(plain, float) and not isfinite(plain) else plain
 
 
 def problem_from(plain):
-    """The `Problem` that plain data is of, to be said in any language (see `problem_of`)."""
+    """Restore a `Problem` from plain data, with its translatable text.
+
+    Parameters
+    ----------
+    plain : dict
+        Result of `problem_of`.
+
+    Returns
+    -------
+    Problem
+    """
+    # Records without a code contain a text that is not translated.
     text = plain["text"]
     if plain.get("code"):
         text = Message(text)
@@ -166,50 +213,53 @@ def problem_from(plain):
 
 
 class InputError(TankcalError):
-    """The input cannot be used; `problems` holds every one that was found, not only the first."""
+    """Input that cannot be used; `problems` contains every problem, not only the first."""
 
     exit_status = 2
 
     def __init__(self, problems):
         self.problems = tuple([problems] if isinstance(problems, Problem) else problems)
+        # The text of the exception contains all problems, one in each line.
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
-    def __reduce__(self):  # so that it comes from another process with its problems
+    def __reduce__(self):  # keeps the problems when the error is pickled by another process
         return type(self), (self.problems,)
 
     @property
     def texts(self):
-        """The lines of its problems, as Messages."""
+        """Lines of the problems, as Messages."""
         return tuple(problem.text for problem in self.problems)
 
 
 class SolutionError(TankcalError):
-    """The input is readable but has no sound solution: singular, not converged, too few points."""
+    """Readable input without a valid solution: singular, not converged, or too few points."""
 
     exit_status = 3
 
 
 class HeightError(TankcalError, ValueError):
-    """A height outside the capacity table was asked for; a table is never extrapolated."""
+    """Requested height outside the capacity table; a table is never extrapolated."""
 
     exit_status = 2
 
 
 class VocabularyError(TankcalError):
-    """A code or a unit that no language has words for; in a record that was read, damage."""
+    """Code or unit without a translation; in a record, a sign of damage."""
 
 
 class CellError(TankcalError):
-    """A cell of the report met what it cannot work with; in a record that was read, damage."""
+    """Value that a cell of the report cannot process; in a record, a sign of damage."""
 
 
 class ProgramError(TankcalError):
-    """A result that contradicts itself, such as an interval that leaves its volume out.
+    """Result that contradicts itself, such as an interval that excludes its own volume.
 
-    The mistake is tankcal's, not the user's: nothing is written, and the message says so.
+    The error is a defect of tankcal, not of the input. No result is written, and the message states
+    the cause.
     """
 
     def __init__(self, message):
+        # The message states that no result was written.
         super().__init__(
             f"{message}: this contradicts itself, so nothing is stated. It is a mistake of "
             "tankcal; please report it with the job"

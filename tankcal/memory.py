@@ -1,4 +1,4 @@
-"""The memory of this process: when garbage is looked for, and what is given back."""
+"""Memory of the process: pauses of the garbage collector, and release of freed memory."""
 
 import ctypes
 import gc
@@ -8,24 +8,27 @@ from contextlib import contextmanager
 
 @contextmanager
 def without_collection():
-    """A context in which the garbage collector rests while much is made that is all kept.
+    """Context manager that pauses the garbage collector while many lasting objects are created.
 
-    It would look through all of that again and again, and find nothing to free: of the rows of a
-    survey with 180 000 readings that takes as long as half of the work itself, of numba and the
-    loops that it loads a fifth.
+    Notes
+    -----
+    The collector would scan the new objects repeatedly without freeing any. For the rows of a
+    survey with 180 000 readings, the scans take half as long as the work itself. For numba and its
+    compiled loops they take a fifth.
     """
     was_on = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
+        # A nested call must not enable the collector of the outer context.
         if was_on:
             gc.enable()
 
 
 @contextmanager
 def without_looking_back():
-    """A context in which the garbage collector leaves alone what is there already: it is kept."""
+    """Context manager that excludes all existing objects from garbage collection."""
     gc.freeze()
     try:
         yield
@@ -34,12 +37,16 @@ def without_looking_back():
 
 
 def return_freed_memory():
-    """Give memory that was freed back to the machine: what computing leaves is in many pieces.
+    """Return freed memory to the operating system.
 
-    Of a survey with 90 000 image points a hundred megabytes, which the C library of Linux would
-    keep while the papers are set; others have no such function, and nothing is done.
+    Notes
+    -----
+    Computation leaves fragmented free memory: about 100 MB for a survey with 90 000 image points.
+    The C library of Linux would keep this memory while the report is typeset. Other systems have no
+    such function, and the call has no effect there.
     """
     if sys.platform == "linux":
+        # C libraries other than glibc do not provide malloc_trim.
         trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
         if trim:
             trim(0)

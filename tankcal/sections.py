@@ -1,7 +1,7 @@
-"""Horizontal sections of a shell: points grouped, the circle through them, and their outline.
+"""Horizontal sections of a shell: grouping of points, circle and outline of each group.
 
-Points of a course that do not lie level make no section: their circle and outline are those at
-their mean height, fitted with a taper and a lean.
+Points of a course that are not level form no section. Their circle and outline refer to their mean
+height and are fitted with a taper and a lean.
 """
 
 from dataclasses import dataclass, replace
@@ -26,18 +26,19 @@ from tankcal.geometry.outlines import (
     smooth_outline,
 )
 
-RING_GAP, RING_SPREAD = 0.10, 0.15  # of the course height: between rings, within one ring
-LEAST_SD_M = 1e-6  # added to a full covariance that is singular
-HIGHEST_DEGREE, MOST_AMPLIFICATION = 2, 6.0  # of the sd of a mean radius, at an end of a course
+RING_GAP, RING_SPREAD = 0.10, 0.15  # height gap between rings, height range of a ring; per course
+LEAST_SD_M = 1e-6  # regularises a dense covariance that is singular
+HIGHEST_DEGREE, MOST_AMPLIFICATION = 2, 6.0  # in height; of u(mean radius) at an end of a course
 
 
 @dataclass(frozen=True)
 class Group:
-    """Points that make one section, or the one course that they stand on all over its height.
+    """Points of one section, or of a whole course whose points are not level.
 
     Attributes
     ----------
     name : str
+        Name of the section.
     course : int
         Index of the course, from the bottom up.
     height_m : float
@@ -45,9 +46,9 @@ class Group:
     members : ndarray of int, shape (n,)
         Indices of the points.
     span_m : tuple of float, or None
-        Bottom and top of the course, m; None when they are not known.
+        Heights of the bottom and the top of the course, m; None if unknown.
     degree : int
-        Of the polynomial in height that the points are fitted by; 0 when they are level.
+        Degree of the polynomial in height that is fitted to the points; 0 for level points.
     """
 
     name: str
@@ -58,7 +59,7 @@ class Group:
     degree: int = 0
 
     def zeta(self, height_m):
-        """Heights within the course: -1 at its bottom, +1 at its top; 0 when it is not known."""
+        """Relative heights within the course: -1 at its bottom, +1 at its top; 0 without a span."""
         if self.span_m is None:
             return 0.0 * np.asarray(height_m)
         bottom, top = self.span_m
@@ -67,17 +68,18 @@ class Group:
 
 @dataclass(frozen=True)
 class Section:
-    """Points of a group, their circle, and their outline.
+    """Group of points with its circle and outline.
 
     Attributes
     ----------
     group : Group
+        The points.
     circle : Circle
         Least-squares circle.
     outline : Outline
-        At group.height_m.
+        Outline at group.height_m.
     radii_by_points : sparse array, shape (n, 3n)
-        Derivative of the outline's n measured radii by x, y, z of the points.
+        Derivatives of the n measured radii of the outline by x, y, z of the points.
     """
 
     group: Group
@@ -87,17 +89,18 @@ class Section:
 
 
 def group_by_height(height_m, azimuth_rad, course, joints_m):
-    """Sections of points without a section number: rings where they lie level, else one a course.
+    """Group points without a section name: into rings where they are level, else by course.
 
-    Points of a course form rings when each cluster of heights (apart by a tenth of the course,
-    level within 15 % of it) has 5 points or more and no gap of a third of a turn.
+    The points of a course form rings if each cluster of heights has at least 5 points and no gap of
+    a third of a turn. Clusters are separated by at least a tenth of the course height. The heights
+    of a cluster lie within 15 % of the course height.
 
     Parameters
     ----------
     height_m : ndarray, shape (n,)
-        Above the bottom, m.
+        Heights above the bottom, m.
     azimuth_rad : ndarray, shape (n,)
-        About the axis, rad.
+        Azimuths about the axis, rad.
     course : ndarray of int, shape (n,)
         Index of the course of each point.
     joints_m : array_like, shape (courses + 1,)
@@ -106,7 +109,7 @@ def group_by_height(height_m, azimuth_rad, course, joints_m):
     Returns
     -------
     list of Group
-        Named "1", "2", or "2.1", "2.2" for rings, from the bottom up.
+        From the bottom up, named "1", "2", or "2.1", "2.2" for rings.
 
     Examples
     --------
@@ -114,8 +117,8 @@ def group_by_height(height_m, azimuth_rad, course, joints_m):
 
     >>> azimuth = np.tile(np.arange(8) * np.pi / 4, 2)
     >>> height = np.repeat([0.5, 1.5], 8)
-    >>> found = group_by_height(height, azimuth, np.zeros(16, dtype=int), [0.0, 2.0])
-    >>> [(one.name, one.height_m) for one in found]
+    >>> groups = group_by_height(height, azimuth, np.zeros(16, dtype=int), [0.0, 2.0])
+    >>> [(group.name, group.height_m) for group in groups]
     [('1.1', 0.5), ('1.2', 1.5)]
     """
     groups = []
@@ -125,35 +128,39 @@ def group_by_height(height_m, azimuth_rad, course, joints_m):
             continue
         span = (float(joints_m[index]), float(joints_m[index + 1]))
         tall = span[1] - span[0]
-        rings = _rings(height_m[members], tall)
+        # Rings are accepted only if every cluster is a complete, level ring; otherwise the whole
+        # course becomes a single group with a fit in height.
+        rings = _split_rings(height_m[members], tall)
         name = str(index + 1)
         if len(rings) > 1 and all(
             _is_ring(height_m[members[ring]], azimuth_rad[members[ring]], tall) for ring in rings
         ):
             for number, ring in enumerate(rings, start=1):
-                chosen = members[ring]
-                height = float(height_m[chosen].mean())
-                groups.append(Group(f"{name}.{number}", index, height, chosen, span))
+                ring_members = members[ring]
+                height = float(height_m[ring_members].mean())
+                groups.append(Group(f"{name}.{number}", index, height, ring_members, span))
         else:
             height = float(height_m[members].mean())
             groups.append(Group(name, index, height, members, span))
-    return _with_degrees(groups, height_m, azimuth_rad)
+    return _add_degrees(groups, height_m, azimuth_rad)
 
 
 def group_by_name(names, height_m, course_of, azimuth_rad=None, joints_m=None):
-    """Sections of points that carry a section name; their mean height decides the course.
+    """Group points by their section name; the mean height determines the course.
 
     Parameters
     ----------
     names : sequence of str, length n
+        Section name of each point.
     height_m : ndarray, shape (n,)
-        Above the bottom, m.
+        Heights above the bottom, m.
     course_of : callable
         course_of(height_m) -> index of the course.
     azimuth_rad : ndarray, shape (n,), optional
+        Azimuths, rad; required with `joints_m`.
     joints_m : array_like, shape (courses + 1,), optional
-        Azimuths (rad) and joints (m) tell whether a section whose points are not level carries a
-        fit in height; without them every section counts as level.
+        Heights of the joints, m. With joints and azimuths, sections that are not level get a
+        polynomial in height. Without them, every section counts as level.
 
     Returns
     -------
@@ -162,68 +169,78 @@ def group_by_name(names, height_m, course_of, azimuth_rad=None, joints_m=None):
 
     Examples
     --------
-    >>> found = group_by_name(["b", "a", "b"], np.array([2.0, 1.0, 2.2]), lambda height: 0)
-    >>> [(one.name, one.members.tolist()) for one in found]
+    >>> groups = group_by_name(["b", "a", "b"], np.array([2.0, 1.0, 2.2]), lambda height: 0)
+    >>> [(group.name, group.members.tolist()) for group in groups]
     [('a', [1]), ('b', [0, 2])]
     """
     groups = []
     for name in dict.fromkeys(names):
-        members = np.array([i for i, other in enumerate(names) if other == name])
+        # dict.fromkeys keeps the order of the names, so that the result does not depend on hashing.
+        members = np.array([i for i, item in enumerate(names) if item == name])
         height = float(height_m[members].mean())
         course = int(course_of(height))
         span = None if joints_m is None else tuple(map(float, joints_m[course : course + 2]))
         groups.append(Group(name, course, height, members, span))
     groups.sort(key=lambda group: group.height_m)
-    return groups if joints_m is None else _with_degrees(groups, height_m, azimuth_rad)
+    return groups if joints_m is None else _add_degrees(groups, height_m, azimuth_rad)
 
 
-def _with_degrees(groups, height_m, azimuth_rad):
-    """The groups, with the degree in height of those that have a course for themselves."""
+def _add_degrees(groups, height_m, azimuth_rad):
+    """Add the degree in height to each group that is the only group of its course."""
     courses = [group.course for group in groups]
     return [
-        replace(group, degree=_degree(group, height_m[group.members], azimuth_rad[group.members]))
+        replace(
+            group, degree=_find_degree(group, height_m[group.members], azimuth_rad[group.members])
+        )
         if courses.count(group.course) == 1
         else group
         for group in groups
     ]
 
 
-def _degree(group, height_m, azimuth_rad):
-    """Degree of the polynomial in height that points determine: 0, 1 or 2.
+def _find_degree(group, height_m, azimuth_rad):
+    """Degree of the polynomial in height that the points determine: 0, 1 or 2.
 
-    The highest by which the mean radius at either end of the course has at most 6 times the sd of
-    the mean radius of all points, whatever low harmonics the section has (points along a spiral
-    tell nothing of a taper), with two points or more for each of these unknowns. Level points
-    (within 15 % of the course) have degree 0.
+    Level points (within 15 % of the course height) have degree 0. Otherwise the result is the
+    highest degree that meets two conditions. Each unknown has at least two points. At either end of
+    the course, u of the mean radius is at most 6 times u of the mean radius of all points. Low
+    harmonics of the section are estimated as well, because points along a spiral do not separate
+    them from a taper.
     """
+    # Level points cannot determine a slope in height.
     bottom, top = group.span_m
     if np.ptp(height_m) <= RING_SPREAD * (top - bottom):
         return 0
     n = len(height_m)
+    # Harmonics from order 2 on; the free columns below contain the radius and the centre.
     waves = harmonics(azimuth_rad, max(min(n // 8, 6), 1))[:, 3:]
     ends = np.array([-1.0, 1.0])
+    # The highest degree with sufficient precision wins.
     for degree in range(HIGHEST_DEGREE, 0, -1):
         free = free_columns(azimuth_rad, group.zeta(height_m), degree)
         design = np.hstack([free, waves])
         if n < 2 * design.shape[1] or np.linalg.matrix_rank(design) < design.shape[1]:
             continue
+        # Variance of the mean radius at both ends, for observations of unit variance.
         at_ends = np.zeros((2, design.shape[1]))
         at_ends[:, : free.shape[1]] = free_columns(np.zeros(2), ends, degree)
-        at_ends[:, [1, 2, 4, 5]] = 0.0  # the mean has no wave
+        at_ends[:, [1, 2, 4, 5]] = 0.0  # the mean radius does not depend on the centre
         variance = np.sum(at_ends * np.linalg.solve(design.T @ design, at_ends.T).T, axis=1)
-        # rounding makes a variance negative where the columns are all but dependent
+        # Rounding makes a variance negative if the columns are nearly dependent.
         if variance.min() >= 0 and n * variance.max() <= MOST_AMPLIFICATION**2:
             return degree
     return 0
 
 
-def _rings(height_m, tall_m):
+def _split_rings(height_m, tall_m):
+    """Split heights (n,) into clusters separated by a gap; return arrays of indices."""
     order = np.argsort(height_m, kind="stable")
     cuts = np.flatnonzero(np.diff(height_m[order]) > RING_GAP * tall_m) + 1
     return np.split(order, cuts)
 
 
 def _is_ring(height_m, azimuth_rad, tall_m):
+    """Whether points are level, number at least 5 and leave no gap of a third of a turn."""
     ordered = np.sort(azimuth_rad)
     gaps = np.diff(ordered, append=ordered[0] + 2 * np.pi)
     level = np.ptp(height_m) <= RING_SPREAD * tall_m
@@ -231,15 +248,17 @@ def _is_ring(height_m, azimuth_rad, tall_m):
 
 
 def coordinates_of(points):
-    """Places of the coordinates of points among all coordinates x1 y1 z1 x2 ...
+    """Indices of the coordinates of points in the vector x1 y1 z1 x2 ...
 
     Parameters
     ----------
     points : array_like of int, shape (k,)
+        Indices of the points.
 
     Returns
     -------
     ndarray of int, shape (3k,)
+        Indices of their coordinates.
 
     Examples
     --------
@@ -250,18 +269,20 @@ def coordinates_of(points):
 
 
 def covariance_of(points, covariance_m2):
-    """Covariance of some points out of that of all; a dense one is made positive definite.
+    """Covariance of selected points; a dense covariance is made positive definite.
 
     Parameters
     ----------
     points : array_like of int, shape (k,)
+        Indices of the points.
     covariance_m2 : ndarray or sparse matrix, shape (3n, 3n)
+        Covariance of all points, m2.
 
     Returns
     -------
     ndarray or sparse matrix, shape (3k, 3k)
-        In m2. To a dense block that is singular (a fixed point, a free network) the variance of a
-        micrometre is added.
+        Covariance of the selected points, m2. A singular dense covariance (fixed point, free
+        network) is increased by the variance of one micrometre.
 
     Examples
     --------
@@ -274,22 +295,24 @@ def covariance_of(points, covariance_m2):
     block = covariance_m2[np.ix_(index, index)]
     try:
         np.linalg.cholesky(block)
-    except np.linalg.LinAlgError:  # a fixed point, or a free network
+    except np.linalg.LinAlgError:
+        # Singular: a fixed point, or a free network.
         block = block + LEAST_SD_M**2 * np.eye(len(index))
     return block
 
 
 def own_covariances(covariance_m2):
-    """Covariance of each point, where that of all is sparse and they are independent; else None.
+    """Covariance of each point, if the covariance of all points is sparse and block-diagonal.
 
     Parameters
     ----------
     covariance_m2 : ndarray or sparse matrix, shape (3n, 3n)
+        Covariance of all points, m2.
 
     Returns
     -------
     ndarray, shape (n, 3, 3), or None
-        In m2.
+        Covariances in m2; None for a dense matrix or for correlated points.
 
     Examples
     --------
@@ -299,34 +322,41 @@ def own_covariances(covariance_m2):
     if not scipy.sparse.issparse(covariance_m2):
         return None
     entries = covariance_m2.tocoo()
-    (point, row), (other, column) = (np.divmod(one, 3) for one in (entries.row, entries.col))
-    if np.any(point != other):
+    # An entry that relates two points contradicts independence.
+    (point, row), (column_point, column) = (
+        np.divmod(index, 3) for index in (entries.row, entries.col)
+    )
+    if np.any(point != column_point):
         return None
-    found = np.zeros((covariance_m2.shape[0] // 3, 3, 3))
-    np.add.at(found, (point, row, column), entries.data)
-    return found
+    blocks = np.zeros((covariance_m2.shape[0] // 3, 3, 3))
+    np.add.at(blocks, (point, row, column), entries.data)
+    return blocks
 
 
 def slide(xyz_m, slope, z_m):
-    """Points slid parallel to the axis to height z, and the derivative.
-
-    A horizontal cut of a leaning shell is what is wanted, so the tilt is contained and never
-    corrected again. The slope itself is taken as exact: its error has opposite signs on opposite
-    sides of the tank, so the area hardly changes with it.
+    """Slide points parallel to the axis to the height z, and differentiate the result.
 
     Parameters
     ----------
     xyz_m : array_like, shape (n, 3)
+        Points, m.
     slope : array_like, shape (2,)
-        Of the axis: metres in x and y for a metre of height.
+        Slope of the axis: displacement in x and y per unit of height.
     z_m : float
         Height of the cut, m.
 
     Returns
     -------
     xy_m : ndarray, shape (n, 2)
+        Coordinates in the horizontal cut, m.
     by_xyz : sparse array, shape (2n, 3n)
-        d(xy) / d(xyz).
+        Derivatives d(xy) / d(xyz).
+
+    Notes
+    -----
+    The capacity table requires a horizontal cut of a leaning shell. The cut contains the tilt,
+    which therefore needs no later correction. The slope is treated as exact. Its error has opposite
+    signs on opposite sides of the tank, so that the area hardly depends on it.
 
     Examples
     --------
@@ -335,39 +365,39 @@ def slide(xyz_m, slope, z_m):
     ([[0.98, 0.0]], [1.0, 0.0, -0.01])
     """
     n = len(xyz_m)
+    # Row 2i is x - slope_x (z - z_cut) of point i, row 2i + 1 is y - slope_y (z - z_cut).
     rows = np.repeat(np.arange(2 * n), 2)
     columns = np.add.outer(3 * np.arange(n), [0, 2, 1, 2]).ravel()
     values = np.tile([1.0, -slope[0], 1.0, -slope[1]], n)
     by_xyz = scipy.sparse.csr_array((values, (rows, columns)), shape=(2 * n, 3 * n))
-    return _slid(xyz_m, slope, z_m), by_xyz
+    return _slide_points(xyz_m, slope, z_m), by_xyz
 
 
-def _slid(xyz_m, slope, z_m):
+def _slide_points(xyz_m, slope, z_m):
+    """Coordinates (n, 2) of points slid parallel to the axis to the height z, m."""
     xyz_m = np.asarray(xyz_m, dtype=float)
     return xyz_m[:, :2] - (xyz_m[:, 2:] - z_m) * np.asarray(slope)
 
 
-def _by_own(slope):
-    """(2, 3) derivative of x and y of a point that is slid by its own x, y, z."""
+def _slide_jacobian(slope):
+    """Derivative (2, 3) of the slid x and y of a point by its x, y, z."""
     return np.column_stack([np.eye(2), -np.asarray(slope, dtype=float)])
 
 
-def _in_plan(xyz_m, covariance_m2, slope, z_m):
-    """Points (n, 2) slid to height z, and their covariance, of each point where it was so given."""
+def _project_to_plan(xyz_m, covariance_m2, slope, z_m):
+    """Points (n, 2) slid to the height z, and their covariance.
+
+    The covariance has the form of the input: (2n, 2n), or (n, 2, 2) for independent points.
+    """
     if np.ndim(covariance_m2) == 3:
-        by_own = _by_own(slope)
-        return _slid(xyz_m, slope, z_m), by_own @ covariance_m2 @ by_own.T
+        jacobian = _slide_jacobian(slope)
+        return _slide_points(xyz_m, slope, z_m), jacobian @ covariance_m2 @ jacobian.T
     xy, by_xyz = slide(xyz_m, slope, z_m)
     return xy, by_xyz @ covariance_m2 @ by_xyz.T
 
 
 def sample_of(group, xyz_m, covariance_m2, slope, z_m):
-    """Radii of a group of points about the centre of their circle, for the field of the wall.
-
-    Radius and centre are free there, so an approximate centre will do. The ellipse that the lean
-    makes of a circle is known, so it is taken off: the field would have to learn it as ovality, and
-    points that are not level do not separate ovality from bulge. Its factor departs from one by
-    m^2 / 4 (6e-4 for 50 mm/m), too little to count in the covariance.
+    """Radii of a group of points about the centre of its circle, for the wall field.
 
     Parameters
     ----------
@@ -377,35 +407,44 @@ def sample_of(group, xyz_m, covariance_m2, slope, z_m):
     Returns
     -------
     form.Sample
+
+    Notes
+    -----
+    The wall field estimates radius and centre itself, so that an approximate centre is sufficient.
+    The horizontal cut of a leaning circular shell is an ellipse. This known ellipse is removed from
+    the radii. Otherwise the field would estimate it as ovality, and points that are not level do
+    not separate ovality from bulge. The factor differs from one by at most m^2 / 4 (6e-4 for 50
+    mm/m), which the covariance neglects.
     """
-    xy, covariance_xy = _in_plan(xyz_m, covariance_m2, slope, z_m)
+    xy, covariance_xy = _project_to_plan(xyz_m, covariance_m2, slope, z_m)
+    # An algebraic circle is sufficient; the shift to the mean avoids cancellation.
     middle = xy.mean(axis=0)
     centre = taubin_circle(xy - middle)[:2] + middle
     noise = radial_covariance(xy, centre, covariance_xy)
     azimuth, radius = polar(xy, *centre)
     radius = radii_square_to_axis(azimuth, radius, slope)
-    return Sample(azimuth, radius, noise, _zeta(group, xyz_m, z_m), centre)
+    return Sample(azimuth, radius, noise, _relative_heights(group, xyz_m, z_m), centre)
 
 
 def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
-    """Circle and outline of the points of one group.
-
-    The outline is smoothed by the form and the noise of the wall in every section. So a missing
-    point does not give a section another estimator than its neighbours.
+    """Fit the circle and the outline of one group of points.
 
     Parameters
     ----------
     group : Group
-    xyz_m : (n, 3) array
-        The members of the group, in metres.
-    covariance_m2 : (3n, 3n) array or sparse matrix, or (n, 3, 3) array
-        In the order x1 y1 z1 x2 ...; or that of each point, where they are independent.
-    slope : (2,) array
-        Of the axis: metres in x and y for a metre of height.
+        The group.
+    xyz_m : array_like, shape (n, 3)
+        Coordinates of the members of the group, m.
+    covariance_m2 : ndarray or sparse matrix, shape (3n, 3n), or ndarray, shape (n, 3, 3)
+        Covariance in the order x1 y1 z1 x2 ..., m2; or of each point, if the points are
+        independent.
+    slope : array_like, shape (2,)
+        Slope of the axis: displacement in x and y per unit of height.
     z_m : float
-        Height of the cut (group.height_m) in the frame of the points.
+        Height of the cut (group.height_m) in the frame of the points, m.
     form_m2 : float
-        Amplitude of the shell's form: mode k >= 2 of the outline has the variance form_m2 k^-3.
+        Amplitude of the form of the shell, m2: mode k >= 2 of the outline has the variance form_m2
+        k^-3.
 
     Returns
     -------
@@ -414,11 +453,16 @@ def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
     Raises
     ------
     SolutionError
-        For fewer than 3 points, or points on a line.
+        For fewer than 3 points, or for points on a line.
+
+    Notes
+    -----
+    In every section the outline is smoothed with the form and the noise of the whole wall. A
+    section with a missing point therefore uses the same estimator as its neighbours.
 
     Examples
     --------
-    Twelve points, 1 mm each, on a circle of 6.5 m radius: u of the radius is 1 mm / sqrt(12).
+    Twelve points with u = 1 mm on a circle of 6.5 m radius: u of the radius is 1 mm / sqrt(12).
 
     >>> azimuth = np.arange(12) * np.pi / 6
     >>> xyz = 6.5 * np.column_stack([np.sin(azimuth), np.cos(azimuth), np.zeros(12)])
@@ -429,24 +473,37 @@ def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
     >>> round(float(np.sqrt(section.circle.cofactor_m2[2, 2])) * 1000, 4)
     0.2887
     """
-    xy, covariance_xy = _in_plan(xyz_m, covariance_m2, slope, z_m)
+    xy, covariance_xy = _project_to_plan(xyz_m, covariance_m2, slope, z_m)
     circle = fit_circle(xy, covariance_xy)
     centre = circle.x_m, circle.y_m
-    here, zeta = float(group.zeta(group.height_m)), _zeta(group, xyz_m, z_m)
+    group_zeta, zeta = float(group.zeta(group.height_m)), _relative_heights(group, xyz_m, z_m)
     noise = radial_covariance(xy, centre, covariance_xy)
-    outline = smooth_outline(xy, *centre, noise, form_m2, zeta - here, group.degree)
-    by_points = own_columns(radii_by_coordinates(outline, xy) @ _by_own(slope))
+    # Relative heights count from the height of the group, at which the outline is stated.
+    outline = smooth_outline(xy, *centre, noise, form_m2, zeta - group_zeta, group.degree)
+    # Chain rule: radii by plan coordinates, plan coordinates by x, y, z.
+    by_points = own_columns(radii_by_coordinates(outline, xy) @ _slide_jacobian(slope))
     return Section(group, circle, outline, by_points)
 
 
 def circle_by_coordinates(section, xyz_m, covariance_m2, slope, z_m):
-    """(3, 3n) derivative of x, y and radius of a section's circle by x, y, z of its points.
+    """Derivatives of the circle of a section by the coordinates of its points.
 
-    xyz_m, covariance_m2, slope, z_m  as in `fit_section`, which it came from
+    Parameters
+    ----------
+    section : Section
+        Result of `fit_section` with the following arguments.
+    xyz_m, covariance_m2, slope, z_m
+        As in `fit_section`.
+
+    Returns
+    -------
+    ndarray, shape (3, 3n)
+        Derivatives of x, y and radius by x1, y1, z1, x2, ...
     """
-    by_xy = circle_by_points(section.circle, *_in_plan(xyz_m, covariance_m2, slope, z_m))
-    return (by_xy.reshape(3, -1, 2) @ _by_own(slope)).reshape(3, -1)
+    by_xy = circle_by_points(section.circle, *_project_to_plan(xyz_m, covariance_m2, slope, z_m))
+    return (by_xy.reshape(3, -1, 2) @ _slide_jacobian(slope)).reshape(3, -1)
 
 
-def _zeta(group, xyz_m, z_m):
+def _relative_heights(group, xyz_m, z_m):
+    """Relative heights of points within the course, given in the frame of the points."""
     return group.zeta(np.asarray(xyz_m)[:, 2] - z_m + group.height_m)

@@ -1,15 +1,17 @@
-"""The one engine of uncertainty: u, degrees of freedom, k and U of anything, and its budget.
+"""Public interface to uncertainty: u, degrees of freedom, k, U and budgets.
 
-A table, a budget, a delivery and a plan are made of `Source`s and take u, degrees of freedom, k and
-U from `combine`; searches that keep sums for speed from `sum_of_fourths` and `dof_of`. Any other
-model goes through `propagate`, which makes the same sources:
+Tables, budgets, deliveries and plans combine `Source`s with `combine`, which gives u, degrees of
+freedom, k and U. Searches that store sums for speed use `sum_of_fourths` and `dof_of`. For any
+other model, `propagate` produces the same sources:
 
     inputs = Inputs([Input("d", within(0.01, mean=4.8), "m"), ...], {("d", "h"): 0.5})
     result = propagate(lambda x: np.pi / 4 * x[0] ** 2 * x[1], inputs)
     result.u, result.dof, result.expanded(0.95), result.covariance
     budget(result, row=0)
 
-Distributions (`within`, ...) are in `tankcal.gum`. Source: JCGM 100:2008; JCGM 102:2011.
+`tankcal.gum` contains the distributions (`within`, ...).
+
+Source: JCGM 100:2008; JCGM 102:2011.
 """
 
 from tankcal.gum.budget import BudgetRow, Shares, budget

@@ -1,1 +1,1 @@
-"""The camera: its model, the refinement of image points, the formats of other programs."""
+"""Camera model, refinement of image points, and camera formats of other programs."""

@@ -1,16 +1,18 @@
-"""From comparator readings to photo coordinates, through the fiducial or reseau marks of a photo.
+"""Transformation of comparator readings to photo coordinates, by fiducial or reseau marks.
 
     affine      x' = a1 x + a2 y + a3,   y' = a4 x + a5 y + a6
     similarity  the same with a5 = a1 and a4 = -a2
 
-The readings of the marks are the observations, their calibrated coordinates (x', y') hold exactly;
-least squares by tankcal.adjust. A transformed point carries its own covariance, turned into the
-photo system, and that of the parameters:
+The readings of the marks are the observations. Their calibrated coordinates (x', y') are exact. The
+parameters follow by least squares (tankcal.adjust). The covariance of a transformed point has two
+parts, its own covariance in the photo system and the covariance of the parameters:
 
     C = M C_point M' + J C_parameters J',   M = [[a1, a2], [a4, a5]]
 
-The second part is common to all points of a photo, so it does not shrink when readings are
-averaged. Millimetres throughout. Source: Silva 1995 (59); Mikhail & Ackermann 1976, ch. 9.
+The second part is common to all points of a photo, and averaging of readings does not reduce it.
+All lengths are in mm.
+
+Source: Silva 1995 (59); Mikhail & Ackermann 1976, ch. 9.
 """
 
 from dataclasses import dataclass
@@ -22,27 +24,27 @@ from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
-KINDS = {"affine": 3, "similarity": 2}  # and the fewest marks that determine each
-GROSS = 0.002  # residual of a mark over the extent of the marks: more than film ever shrinks
-SHEAR = 0.01  # largest over smallest scale of an affine transformation, less 1
-ONE_LINE = 0.01  # width of the marks over their length: below, they lie on one line
-SCALES = (0.8, 1.25)  # a comparator reads the photo itself, in millimetres
+KINDS = {"affine": 3, "similarity": 2}  # least number of marks
+GROSS = 0.002  # residual of a mark, relative to the extent; larger than any film shrinkage
+SHEAR = 0.01  # largest ratio of the scales of an affine transformation, minus 1
+ONE_LINE = 0.01  # ratio of width to length below which the marks lie on a line
+SCALES = (0.8, 1.25)  # limits of the scale: a comparator measures the photo itself, in mm
 
 
 @dataclass(frozen=True)
 class Repeats:
-    """Repeated readings of n different things, in the order of their first readings.
+    """Repeated readings of n distinct points, in the order of their first readings.
 
     Attributes
     ----------
     group : ndarray of int, shape (readings,)
-        Number of the thing.
+        Number of the point of each reading.
     first, count : ndarray of int, shape (n,)
-        Number of its first reading, and how many there are.
+        Index of the first reading, and number of readings.
     mean : ndarray, shape (n, 2)
-        Mean without weights.
+        Unweighted mean.
     sd : ndarray, shape (n, 2)
-        Standard deviation of one reading, from the sample; nan for a single reading.
+        Sample standard deviation of one reading; nan for a single reading.
     """
 
     group: np.ndarray
@@ -52,20 +54,20 @@ class Repeats:
     sd: np.ndarray
 
     def beyond(self, limit):
-        """(n,) True where the sd of x or of y exceeds a limit; None: nowhere."""
+        """True (n,) where the standard deviation of x or y exceeds a limit; None: no limit."""
         with np.errstate(invalid="ignore"):
             return (self.sd > (np.inf if limit is None else limit)).any(axis=1)
 
 
 def repeats(names, values):
-    """Gather the repeated readings of things by their names.
+    """Group repeated readings by name.
 
     Parameters
     ----------
-    names : sequence of m hashables
-        What each reading is of.
+    names : sequence of hashable, length m
+        Name of the point of each reading.
     values : array_like, shape (m, 2)
-        The readings.
+        Readings.
 
     Returns
     -------
@@ -74,8 +76,8 @@ def repeats(names, values):
 
     Examples
     --------
-    >>> found = repeats(["A", "B", "A"], [[0, 0], [5, 5], [0.002, 0]])
-    >>> found.count, found.mean[:, 0].tolist()
+    >>> readings = repeats(["A", "B", "A"], [[0, 0], [5, 5], [0.002, 0]])
+    >>> readings.count, readings.mean[:, 0].tolist()
     (array([2, 1]), [0.001, 5.0])
     """
     numbers = {}
@@ -83,18 +85,19 @@ def repeats(names, values):
     values = np.asarray(values, dtype=float).reshape(len(group), 2)
     count = np.bincount(group, minlength=len(numbers))
     first = np.unique(group, return_index=True)[1]
-    away = values - values[first][group]  # the digits that readings have in common are taken off
+    # Subtracting the first reading avoids cancellation in the sum of squares.
+    deviations = values - values[first][group]
     sums = np.zeros((2, len(numbers), 2))
-    np.add.at(sums[0], group, away)
+    np.add.at(sums[0], group, deviations)
     mean = sums[0] / count[:, None]
-    np.add.at(sums[1], group, (away - mean[group]) ** 2)
+    np.add.at(sums[1], group, (deviations - mean[group]) ** 2)
     dof = np.where(count > 1, count - 1, np.nan)[:, None]
     return Repeats(group, first, count, values[first] + mean, np.sqrt(sums[1] / dof))
 
 
 @dataclass(frozen=True)
 class Transformation:
-    """A plane transformation from readings to the photo system, with its covariance.
+    """Plane transformation from readings to the photo system, with its covariance.
 
     Attributes
     ----------
@@ -107,11 +110,12 @@ class Transformation:
     centre_mm : ndarray, shape (2,)
         Centre of the readings, mm.
     covariance : ndarray, shape (6, 6)
-        Of a1, a2, x', a4, a5, y': M's elements and the image of this centre; of variance factor 1.
+        Covariance of a1, a2, x', a4, a5, y' for variance factor 1, with (x', y') the image of the
+        centre.
     residuals_mm : ndarray, shape (n, 2)
-        Of the readings in the photo system, transformed minus calibrated, mm.
+        Residuals in the photo system, transformed minus calibrated, mm.
     chi2, dof : float, int
-        Of the residuals, in the declared standard deviations of the readings.
+        Weighted sum of squared residuals, and degrees of freedom.
     """
 
     kind: str
@@ -125,50 +129,52 @@ class Transformation:
 
     @property
     def sigma0(self):
-        """A-posteriori root of the variance factor; nan when nothing is redundant."""
+        """Square root of the a-posteriori variance factor; nan without redundancy."""
         return float(np.sqrt(self.chi2 / self.dof)) if self.dof > 0 else np.nan
 
     @property
     def parameters(self):
-        """{name: value} a1 to a6 of the affine form, mm where they are shifts."""
+        """Parameters a1 to a6 of the affine form by name; a3 and a6 in mm."""
         (a1, a2), (a4, a5) = self.matrix
         return dict(zip(_NAMES, (a1, a2, self.shift_mm[0], a4, a5, self.shift_mm[1]), strict=True))
 
     @property
     def parameter_sds(self):
-        """{name: sd} of a1 to a6."""
+        """Standard deviations of a1 to a6 by name."""
+        # a3 = x' - M centre: the covariance refers to the image of the centre, not to the shift.
         turn = np.eye(6)
         turn[2, :2], turn[5, 3:5] = -self.centre_mm, -self.centre_mm
         return dict(zip(_NAMES, np.sqrt(np.diag(turn @ self.covariance @ turn.T)), strict=True))
 
     @property
     def is_mirrored(self):
-        """True when it turns the image over."""
+        """Whether the transformation mirrors the image."""
         return bool(np.linalg.det(self.matrix) < 0)
 
     @property
     def scales(self):
-        """(2,) largest and smallest scale over all directions."""
+        """Largest and smallest scale (2,) over all directions."""
         return np.linalg.svd(self.matrix, compute_uv=False)
 
     def of(self, xy_mm):
-        """(n, 2) photo coordinates of readings (n, 2)."""
+        """Photo coordinates (n, 2) of readings (n, 2)."""
         return (np.asarray(xy_mm) - self.centre_mm) @ self.matrix.T + (
             self.matrix @ self.centre_mm + self.shift_mm
         )
 
     def turned(self, sd_mm):
-        """(n, 2) sds in the photo system of readings with sds (n, 2) along the comparator."""
+        """Standard deviations (n, 2) in the photo system, from those along the comparator axes."""
         return np.sqrt(np.asarray(sd_mm) ** 2 @ (self.matrix**2).T)
 
     def added_covariance(self, xy_mm):
-        """(n, 2, 2) mm2 that the parameters add to points read at (n, 2)."""
-        rows = _rows(np.asarray(xy_mm, dtype=float) - self.centre_mm).reshape(-1, 2, 6)
+        """Covariance (n, 2, 2), mm2, of points read at (n, 2) caused by the parameters."""
+        # J C J', the part that is common to all points of the photo.
+        rows = _design_rows(np.asarray(xy_mm, dtype=float) - self.centre_mm).reshape(-1, 2, 6)
         return np.einsum("nik,kl,njl->nij", rows, self.covariance, rows)
 
 
 _NAMES = ("a1", "a2", "a3", "a4", "a5", "a6")
-_SIX = {  # a1, a2, x', a4, a5, y' by the parameters of each kind
+_SIX = {  # derivatives of a1, a2, x', a4, a5, y' by the parameters of each kind
     "affine": np.eye(6),
     "similarity": np.array(
         [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]],
@@ -178,12 +184,12 @@ _SIX = {  # a1, a2, x', a4, a5, y' by the parameters of each kind
 
 
 def transformation(readings_mm, marks_mm, sd_mm, kind="affine"):
-    """The transformation that takes readings of marks to their calibrated coordinates.
+    """Determine the transformation from readings of marks to their calibrated coordinates.
 
     Parameters
     ----------
     readings_mm : array_like, shape (n, 2)
-        Readings, mm; a mark may be there several times.
+        Readings, mm; a mark may occur repeatedly.
     marks_mm : array_like, shape (n, 2)
         Calibrated coordinates, mm, exact.
     sd_mm : float or array_like, shape (n, 2)
@@ -198,53 +204,55 @@ def transformation(readings_mm, marks_mm, sd_mm, kind="affine"):
     Raises
     ------
     SolutionError
-        When the marks are too few, or lie on one line (affine).
+        If the marks are too few, or lie on a line (affine).
 
     Examples
     --------
     >>> readings = [[1, 1], [11, 1], [1, 11], [11, 11]]
-    >>> found = transformation(readings, [[0, 0], [10, 0], [0, 10], [10, 10]], 0.005)
-    >>> found.of([[6.0, 6.0]]).round(9), found.dof
+    >>> result = transformation(readings, [[0, 0], [10, 0], [0, 10], [10, 10]], 0.005)
+    >>> result.of([[6.0, 6.0]]).round(9), result.dof
     (array([[5., 5.]]), 2)
     """
     readings = np.asarray(readings_mm, dtype=float)
     marks = np.asarray(marks_mm, dtype=float)
-    start = _linear(readings, marks, kind)
+    start = _fit_linear(readings, marks, kind)
+    # Readings relative to their centre reduce the correlation of shift and matrix.
     centre, to_six = readings.mean(axis=0), _SIX[kind]
     variance = np.broadcast_to(np.asarray(sd_mm, dtype=float) ** 2, readings.shape).ravel()
 
     def model(p, observed):
         six = to_six @ p
-        a = _rows(observed.reshape(-1, 2) - centre)
+        # Conditions f = J p - mark = 0, with B the matrix M for each reading.
+        a = _design_rows(observed.reshape(-1, 2) - centre)
         b = np.kron(np.eye(len(readings)), six[[0, 1, 3, 4]].reshape(2, 2))
         return a @ six - marks.ravel(), a @ to_six, b
 
-    found = adjust(model, start, readings.ravel(), variance)
-    six = to_six @ found.unknowns
+    result = adjust(model, start, readings.ravel(), variance)
+    six = to_six @ result.unknowns
     matrix = six[[0, 1, 3, 4]].reshape(2, 2)
     return Transformation(
         kind=kind,
         matrix=matrix,
         shift_mm=six[[2, 5]] - matrix @ centre,
         centre_mm=centre,
-        covariance=to_six @ found.cofactor @ to_six.T,
+        covariance=to_six @ result.cofactor @ to_six.T,
         residuals_mm=(readings - centre) @ matrix.T + six[[2, 5]] - marks,
-        chi2=found.chi2,
-        dof=found.dof,
+        chi2=result.chi2,
+        dof=result.dof,
     )
 
 
-def _rows(away):
-    """(2n, 6) image of places (n, 2), counted from the centre, by a1, a2, x', a4, a5, y'."""
-    x, y = away.T
-    zero, one = np.zeros_like(x), np.ones_like(x)
-    both = np.array([[x, y, one, zero, zero, zero], [zero, zero, zero, x, y, one]])
-    return both.transpose(2, 0, 1).reshape(-1, 6)
+def _design_rows(centred):
+    """Derivatives (2n, 6) of the image of centred points (n, 2) by a1, a2, x', a4, a5, y'."""
+    x, y = centred.T
+    zeros, ones = np.zeros_like(x), np.ones_like(x)
+    stacked = np.array([[x, y, ones, zeros, zeros, zeros], [zeros, zeros, zeros, x, y, ones]])
+    return stacked.transpose(2, 0, 1).reshape(-1, 6)
 
 
-def _linear(readings, marks, kind):
-    """Parameters (6,) or (4,) that fit best in the photo system; SolutionError where none do."""
-    away = readings - readings.mean(axis=0)
+def _fit_linear(readings, marks, kind):
+    """Least-squares parameters (6,) or (4,) in the photo system; raises SolutionError."""
+    centred = readings - readings.mean(axis=0)
     if len(readings) < KINDS[kind]:
         raise SolutionError(
             message(
@@ -254,8 +262,9 @@ def _linear(readings, marks, kind):
                 needed=KINDS[kind],
             )
         )
-    rows = _rows(away) @ _SIX[kind]
-    sizes = np.linalg.svd(away, compute_uv=False)
+    rows = _design_rows(centred) @ _SIX[kind]
+    # Singular values of the centred readings: length and width of the marks.
+    sizes = np.linalg.svd(centred, compute_uv=False)
     if sizes[0] == 0 or (kind == "affine" and sizes[1] < ONE_LINE * sizes[0]):
         raise SolutionError(
             message(
@@ -268,18 +277,18 @@ def _linear(readings, marks, kind):
 
 @dataclass(frozen=True)
 class Suspicion:
-    """What is wrong with the marks of a photo, as far as they tell.
+    """Suspected error in the marks of a photo.
 
     Attributes
     ----------
     what : str
-        "mirrored" (the whole plate), "exchanged" (two marks), "wrong" (one mark), "misfit" (nobody
-        knows which), "unit" (of another scale than 1), "sheared".
+        "mirrored" (whole plate), "exchanged" (two marks), "wrong" (one mark), "misfit" (unknown
+        mark), "unit" (scale other than 1), or "sheared".
     marks : tuple of tuples of int
-        Numbers of marks, a tuple for each way that would mend it; of "misfit" the mark of the
+        Indices of the marks, a tuple for each possible correction; for "misfit", the mark with the
         largest residual; else ().
     size : float
-        Largest residual over the extent of the marks; of "unit" and "sheared" the scale.
+        Largest residual relative to the extent of the marks; for "unit" and "sheared", the scale.
     """
 
     what: str
@@ -288,10 +297,11 @@ class Suspicion:
 
 
 def suspicion(readings_mm, marks_mm, kind="affine"):
-    """What is wrong with the marks of a photo, each read once, if anything is.
+    """Search for an error in the marks of a photo, each with a single reading.
 
-    A fit that is worse than film can be, or a transformation that no comparator makes. Which mark
-    it is, is found by trial: the plate turned over, two marks exchanged, one mark left out.
+    An error is suspected if the fit is worse than the distortion of film, or if no comparator can
+    cause the transformation. The error is located by trial: mirrored plate, exchange of two marks,
+    omission of one mark.
 
     Parameters
     ----------
@@ -307,8 +317,8 @@ def suspicion(readings_mm, marks_mm, kind="affine"):
     Examples
     --------
     >>> readings = [[0, 0], [10, 0], [0, 10], [10, 10], [5, 0]]
-    >>> found = suspicion(readings, [[10, 0], [0, 0], [0, 10], [10, 10], [5, 0]])
-    >>> found.what, found.marks
+    >>> error = suspicion(readings, [[10, 0], [0, 0], [0, 10], [10, 10], [5, 0]])
+    >>> error.what, error.marks
     ('exchanged', ((0, 1),))
     """
     readings, marks = np.asarray(readings_mm, dtype=float), np.asarray(marks_mm, dtype=float)
@@ -318,24 +328,41 @@ def suspicion(readings_mm, marks_mm, kind="affine"):
     if fit.is_good and fit.impossible is None:
         return None
     n = len(marks)
-    turned = _Fit.of(readings * [-1, 1], marks, kind)
-    if kind == "similarity" and turned is not None and turned.is_good:
+    mirrored = _Fit.of(readings * [-1, 1], marks, kind)
+    # A similarity cannot mirror, so that a mirrored plate gives a bad fit.
+    if kind == "similarity" and mirrored is not None and mirrored.is_good:
         return Suspicion("mirrored", (), fit.misfit)
-    pairs = tuple(p for p in combinations(range(n), 2) if _agrees(readings, marks, kind, p))
+    pairs = tuple(
+        p for p in combinations(range(n), 2) if _fits_after_exchange(readings, marks, kind, p)
+    )
+    # More than two possible exchanges do not locate the error.
     if 0 < len(pairs) < 3:
         return Suspicion("exchanged", pairs, fit.misfit)
     if fit.is_good:
         return fit.impossible
-    few = n < KINDS[kind] + 2 or pairs
-    alone = [] if few else [k for k in range(n) if _spared(readings, marks, kind, k)]
-    if len(alone) == 1:
-        return Suspicion("wrong", ((alone[0],),), fit.misfit)
+    # Without a mark, at least one redundant mark must remain to confirm the fit.
+    is_ambiguous = n < KINDS[kind] + 2 or pairs
+    wrong_marks = (
+        [] if is_ambiguous else [k for k in range(n) if _fits_without(readings, marks, kind, k)]
+    )
+    if len(wrong_marks) == 1:
+        return Suspicion("wrong", ((wrong_marks[0],),), fit.misfit)
     return Suspicion("misfit", ((fit.worst,),), fit.misfit)
 
 
 @dataclass(frozen=True)
 class _Fit:
-    """A fit in the photo system: matrix M, distances (n,) from the marks, extent of the marks."""
+    """Fit in the photo system.
+
+    Attributes
+    ----------
+    matrix : ndarray, shape (2, 2)
+        M.
+    away_mm : ndarray, shape (n,)
+        Distances from the calibrated marks, mm.
+    extent_mm : float
+        Diagonal of the marks, mm.
+    """
 
     matrix: np.ndarray
     away_mm: np.ndarray
@@ -343,30 +370,34 @@ class _Fit:
 
     @classmethod
     def of(cls, readings, marks, kind):
-        """That of readings of marks, each once; None where they do not determine it."""
+        """Fit of readings to marks, each with one reading; None if the marks are insufficient."""
         try:
-            six = _SIX[kind] @ _linear(readings, marks, kind)
+            six = _SIX[kind] @ _fit_linear(readings, marks, kind)
         except SolutionError:
             return None
-        away = (_rows(readings - readings.mean(axis=0)) @ six).reshape(-1, 2) - marks
+        deviations = (_design_rows(readings - readings.mean(axis=0)) @ six).reshape(-1, 2) - marks
         extent = float(np.linalg.norm(np.ptp(marks, axis=0)))
-        return cls(six[[0, 1, 3, 4]].reshape(2, 2), np.linalg.norm(away, axis=1), extent)
+        return cls(six[[0, 1, 3, 4]].reshape(2, 2), np.linalg.norm(deviations, axis=1), extent)
 
     @property
     def worst(self):
+        """Index of the mark with the largest residual."""
         return int(np.argmax(self.away_mm))
 
     @property
     def misfit(self):
+        """Largest residual relative to the extent of the marks."""
         return float(self.away_mm.max() / self.extent_mm)
 
     @property
     def is_good(self):
+        """Whether the misfit is below GROSS."""
         return self.misfit < GROSS
 
     @property
     def impossible(self):
-        """Suspicion about its scales, or None."""
+        """Suspicion about the scales, or None."""
+        # Singular values are the extreme scales.
         large, small = np.linalg.svd(self.matrix, compute_uv=False)
         if large > (1 + SHEAR) * small:
             return Suspicion("sheared", (), float(large / small))
@@ -376,19 +407,20 @@ class _Fit:
 
     @property
     def is_sound(self):
+        """Whether the fit is good, possible and not mirrored."""
         return self.is_good and self.impossible is None and np.linalg.det(self.matrix) > 0
 
 
-def _agrees(readings, marks, kind, pair):
-    """Is all well when two marks change their names?"""
+def _fits_after_exchange(readings, marks, kind, pair):
+    """Whether the fit is valid after an exchange of two marks."""
     order = np.arange(len(marks))
     order[list(pair)] = pair[::-1]
     fit = _Fit.of(readings[order], marks, kind)
     return fit is not None and fit.is_sound
 
 
-def _spared(readings, marks, kind, number):
-    """Is all well without one mark?"""
-    kept = np.arange(len(marks)) != number
-    fit = _Fit.of(readings[kept], marks[kept], kind)
+def _fits_without(readings, marks, kind, number):
+    """Whether the fit is valid without one mark."""
+    is_kept = np.arange(len(marks)) != number
+    fit = _Fit.of(readings[is_kept], marks[is_kept], kind)
     return fit is not None and fit.is_sound

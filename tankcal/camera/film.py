@@ -1,14 +1,16 @@
-"""Film that is not flat: where an image point would lie on the plane of the photo system.
+"""Unflatness of film: projection of image points onto the plane of the photo system.
 
-The film's surface stands h above that plane at the point (x, y), positive towards the lens. The ray
-through the projection centre, at the principal distance c, that meets the surface there meets the
-plane at
+The surface of the film has the height h above this plane at the point (x, y), positive towards the
+lens. The ray through the projection centre, at the principal distance c, that meets the surface at
+this point meets the plane at
 
-    x' = x c / (c - h),   dx = x h / (c - h),
+    x' = x c / (c - h),   dx = x h / (c - h)
 
-of which dx = (x/c) h (Silva 60) is the first order; y alike; both from the principal point. So a
-film that rises towards the lens has its image points too close to the middle, and they move out.
-Millimetres throughout. Source: Silva 1995 (60).
+with coordinates from the principal point, and likewise for y. dx = (x/c) h (Silva 60) is the
+first-order term. On a film that rises towards the lens, image points are too close to the middle,
+and the correction moves them outwards. All lengths are in mm.
+
+Source: Silva 1995 (60).
 """
 
 from dataclasses import dataclass
@@ -23,9 +25,9 @@ class Surface:
     Attributes
     ----------
     xy_mm : ndarray, shape (n, 2)
-        Places in the photo system, mm.
+        Positions in the photo system, mm.
     height_mm : ndarray, shape (n,)
-        Heights there, mm, positive towards the lens.
+        Heights at these positions, mm, positive towards the lens.
     """
 
     xy_mm: np.ndarray
@@ -33,23 +35,23 @@ class Surface:
 
 
 def heights_at(surface, xy_mm):
-    """Heights of a film at places, linear within triangles.
+    """Heights of a film, interpolated linearly within triangles.
 
-    Outside the hull of what was measured the height of the nearest place is taken.
+    Outside the convex hull of the measured positions, the height of the nearest position is used.
 
     Parameters
     ----------
     surface : Surface
-        At least three places, not on one line.
+        At least three positions, not on a line.
     xy_mm : array_like, shape (m, 2)
-        Places in the photo system, mm; nan stays nan.
+        Positions in the photo system, mm; nan gives nan.
 
     Returns
     -------
     height_mm : ndarray, shape (m,)
         Heights, mm.
     outside : ndarray of bool, shape (m,)
-        True outside the hull of what was measured; places that are nan are not outside.
+        True outside the convex hull; False for nan.
 
     Examples
     --------
@@ -61,42 +63,49 @@ def heights_at(surface, xy_mm):
     from scipy.spatial import cKDTree
 
     xy_mm = np.asarray(xy_mm, dtype=float)
-    known = np.isfinite(xy_mm).all(axis=1)
-    found = np.full(len(xy_mm), np.nan)
-    if known.any():
-        found[known] = LinearNDInterpolator(surface.xy_mm, surface.height_mm)(xy_mm[known])
-    outside = known & np.isnan(found)
+    # Points without a measurement stay nan.
+    is_finite = np.isfinite(xy_mm).all(axis=1)
+    heights = np.full(len(xy_mm), np.nan)
+    if is_finite.any():
+        heights[is_finite] = LinearNDInterpolator(surface.xy_mm, surface.height_mm)(
+            xy_mm[is_finite]
+        )
+    # The interpolator returns nan outside the convex hull.
+    outside = is_finite & np.isnan(heights)
     if outside.any():
         nearest = cKDTree(surface.xy_mm).query(xy_mm[outside])[1]
-        found[outside] = surface.height_mm[nearest]
-    return found, outside
+        heights[outside] = surface.height_mm[nearest]
+    return heights, outside
 
 
 def flatten_film(xy_mm, height_mm, interior):
-    """Move image points read on a film that is not flat to the plane of the photo system.
-
-    x' = x + (x - x0) h / (c - h), y alike.
+    """Project image points on an uneven film onto the plane of the photo system.
 
     Parameters
     ----------
     xy_mm : array_like, shape (n, 2)
-        Image points as read, mm.
+        Measured image points, mm.
     height_mm : ndarray, shape (n,)
         Height of the film at each point, mm.
     interior : sequence of three
-        c, x0, y0, mm, numbers or (n,) each.
+        c, x0, y0, mm, each a number or an array (n,).
 
     Returns
     -------
     ndarray, shape (n, 2)
-        Image points on the plane, mm.
+        Image points in the plane, mm.
+
+    Notes
+    -----
+    x' = x + (x - x0) h / (c - h), and likewise for y.
 
     Examples
     --------
     >>> flatten_film([[50.0, 0.0]], np.array([0.1]), (100.0, 0.0, 0.0))
     array([[50.05005005,  0.        ]])
     """
-    c, x0, y0 = (np.asarray(one, dtype=float) for one in interior)
+    c, x0, y0 = (np.asarray(value, dtype=float) for value in interior)
+    # Similar triangles with the projection centre at the distance c.
     factor = height_mm / (c - height_mm)
     x, y = np.asarray(xy_mm, dtype=float).T
     return np.column_stack([x + (x - x0) * factor, y + (y - y0) * factor])

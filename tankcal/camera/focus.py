@@ -1,17 +1,19 @@
-"""Distortion that changes with distance: with the focus of the lens, and within its depth of field.
+"""Distortion as a function of distance: focus of the lens, and depth of field.
 
-From the radial coefficients at two focus distances S1, S2 those at S follow:
+The radial coefficients at two focus distances S1, S2 determine those at S:
 
     alpha = (S2 - S)/(S2 - S1) (S1 - f)/(S - f)
     Ki(S) = (1 - f/S)^(2i+1) [alpha Ki(S1)/(1 - f/S1)^(2i+1) + (1 - alpha) Ki(S2)/(1 - f/S2)^(2i+1)]
 
 A lens focused at s images a point in the depth s' (along the axis, not the slant range) with
 
-    gamma = (s - f)/(s' - f) s'/s,   Ki(s, s') = gamma^(2i) Ki(s'),
+    gamma = (s - f)/(s' - f) s'/s,   Ki(s, s') = gamma^(2i) Ki(s')
 
-decentring by gamma (1 - f/s') of that at infinity, which is (1 - f/s) whatever s' is: within the
-depth of field decentring does not change. f is the focal length, which is c at infinity, not
-the principal distance; all in mm. Source: Silva 1995 (48-58); Brown 1971; Fryer & Brown 1986.
+Decentring distortion is gamma (1 - f/s') times its value at infinity. This product equals (1 - f/s)
+for every s', so that decentring is constant within the depth of field. f is the focal length, which
+equals c at infinity, not the principal distance. All lengths are in mm.
+
+Source: Silva 1995 (48-58); Brown 1971; Fryer & Brown 1986.
 """
 
 from dataclasses import dataclass
@@ -27,18 +29,18 @@ _ODD, _EVEN = np.array([3, 5, 7]), np.array([2, 4, 6])
 
 @dataclass(frozen=True)
 class Lens:
-    """A lens whose radial distortion is known at two focus distances.
+    """Lens with radial distortion calibrated at two focus distances.
 
     Attributes
     ----------
     focal_length_mm : float
         f, mm.
     focus_mm : float
-        s, distance of the focus from the lens, mm; np.inf: infinity.
+        Distance s of the focus from the lens, mm; np.inf for infinity.
     distances_mm : ndarray, shape (2,)
         S1, S2, mm.
     radial : ndarray, shape (2, 3)
-        K1, K2, K3 at each of them.
+        K1, K2, K3 at each of these distances.
     """
 
     focal_length_mm: float
@@ -48,30 +50,31 @@ class Lens:
 
     @property
     def focused(self):
-        """(3,) K1, K2, K3 for an object in focus."""
+        """K1, K2, K3 (3,) for an object in focus."""
         return self.radial_at(self.focus_mm)
 
     def radial_at(self, distance_mm):
-        """(..., 3) K1, K2, K3 of the lens focused at distances (...)."""
+        """K1, K2, K3 (..., 3) of the lens focused at distances (...)."""
         return radial_at(distance_mm, self.distances_mm, self.radial, self.focal_length_mm)
 
     def in_depth(self, depth_mm):
-        """(..., 3) K1, K2, K3 for objects in depths (...), the lens being focused at focus_mm."""
+        """K1, K2, K3 (..., 3) for objects in depths (...), with the lens focused at focus_mm."""
+        # Ki(s, s') = gamma^(2i) Ki(s').
         gamma = depth_factor(depth_mm, self.focus_mm, self.focal_length_mm)
         return gamma[..., None] ** _EVEN * self.radial_at(depth_mm)
 
 
 def radial_at(distance_mm, distances_mm, radial, focal_length_mm):
-    """Radial coefficients at focus distances from those at two others.
+    """Radial coefficients at any focus distance, from the coefficients at two distances.
 
     Parameters
     ----------
     distance_mm : array_like, shape (...)
-        Focus distances asked for, mm; they may be infinite.
+        Focus distances, mm; may be infinite.
     distances_mm : array_like, shape (2,)
-        S1, S2, mm; they may be infinite.
+        S1, S2, mm; may be infinite.
     radial : array_like, shape (2, 3)
-        K1 (mm^-2), K2 (mm^-4), K3 (mm^-6) at each of them.
+        K1 (mm^-2), K2 (mm^-4), K3 (mm^-6) at S1 and S2.
     focal_length_mm : float
         f, mm.
 
@@ -83,7 +86,7 @@ def radial_at(distance_mm, distances_mm, radial, focal_length_mm):
     Raises
     ------
     ValueError
-        When the two distances are the same.
+        If the two distances are equal.
 
     Examples
     --------
@@ -95,55 +98,57 @@ def radial_at(distance_mm, distances_mm, radial, focal_length_mm):
     if near == far:
         raise ValueError("two calibrations at the same distance say nothing of another one")
     first, second = np.asarray(radial, dtype=float)[np.argsort(distances_mm)]
-    magnified = [one / (1 - f / at) ** _ODD for one, at in ((first, near), (second, far))]
-    # alpha with all distances as their reciprocals, so that each may be infinite
+    at_infinity = [
+        coefficients / (1 - f / distance) ** _ODD
+        for coefficients, distance in ((first, near), (second, far))
+    ]
+    # alpha in terms of reciprocal distances, so that each distance may be infinite.
     alpha = ((1 / s - 1 / far) / (1 / near - 1 / far) * (1 - f / near) / (1 - f / s))[..., None]
-    return (1 - f / s)[..., None] ** _ODD * (alpha * magnified[0] + (1 - alpha) * magnified[1])
+    return (1 - f / s)[..., None] ** _ODD * (alpha * at_infinity[0] + (1 - alpha) * at_infinity[1])
 
 
 def depth_factor(depth_mm, focus_mm, focal_length_mm):
-    """gamma of objects in depths: image in focus over image in that depth (S 56).
-
-    gamma = (1 - f/s) / (1 - f/s')
+    """Factor gamma of objects in depths: image scale in focus over image scale in depth (S 56).
 
     Parameters
     ----------
     depth_mm : array_like, shape (...)
-        s', along the axis, mm.
+        Depth s' along the axis, mm.
     focus_mm, focal_length_mm : float
         s and f, mm.
 
     Returns
     -------
     ndarray, shape (...)
-        gamma.
+        gamma, without a unit.
+
+    Notes
+    -----
+    gamma = (1 - f/s) / (1 - f/s')
 
     Examples
     --------
     >>> round(float(depth_factor(4000.0, 2000.0, 50.0)), 6)
     0.987342
     """
+    # (s - f)/(s' - f) s'/s, with both distances as reciprocals, so that they may be infinite.
     f = focal_length_mm
     return (1 - f / focus_mm) / (1 - f / np.asarray(depth_mm, dtype=float))
 
 
 def refer_to_focus(xy_mm, depth_mm, interior, form, lens):
-    """Image points as they would be if every object lay at the distance of the focus.
-
-    The coefficients in the depth of each point are those of `interior` plus what the two
-    calibrations say of the difference; the image is freed of this distortion and given that of the
-    focus, whatever the convention.
+    """Refer image points to the focus distance: remove the effect of depth on the distortion.
 
     Parameters
     ----------
     xy_mm : array_like, shape (n, 2)
-        Image points as measured, mm.
+        Measured image points, mm.
     depth_mm : array_like, shape (n,)
-        Depths along the axis, mm; nan: left as it is.
+        Depths along the axis, mm; a point with nan is unchanged.
     interior : array_like, shape (13,) or (n, 13)
         Interior parameters for objects in focus.
     form : tankcal.camera.model.Form
-        How the distortion is written, without a balance.
+        Form of the distortion, without a balance.
     lens : Lens
         The two calibrations.
 
@@ -151,13 +156,23 @@ def refer_to_focus(xy_mm, depth_mm, interior, form, lens):
     -------
     ndarray, shape (n, 2)
         Image points, mm.
+
+    Notes
+    -----
+    The coefficients in the depth of a point are those of `interior` plus the difference derived
+    from the two calibrations. The image point is corrected with these coefficients and distorted
+    with the coefficients in focus. The method applies to every convention.
     """
     at_focus = np.broadcast_to(np.asarray(interior, dtype=float), (len(xy_mm), len(PARAMETERS)))
-    known = np.isfinite(depth_mm)
-    there = at_focus[known].copy()
-    there[:, _FIRST : _FIRST + 3] += lens.in_depth(np.asarray(depth_mm)[known]) - lens.focused
-    found = np.array(xy_mm, dtype=float)
-    found[known] = distort_image_points(
-        correct_image_points(found[known], there, form), at_focus[known], form
+    is_finite = np.isfinite(depth_mm)
+    depth_interior = at_focus[is_finite].copy()
+    # Only the difference of both calibrations counts; `interior` may come from another adjustment.
+    depth_interior[:, _FIRST : _FIRST + 3] += (
+        lens.in_depth(np.asarray(depth_mm)[is_finite]) - lens.focused
     )
-    return found
+    image = np.array(xy_mm, dtype=float)
+    # Correct with the distortion in depth, then distort with the distortion in focus.
+    image[is_finite] = distort_image_points(
+        correct_image_points(image[is_finite], depth_interior, form), at_focus[is_finite], form
+    )
+    return image

@@ -1,8 +1,8 @@
-"""The image of a point and its derivatives: one set of formulas, run over arrays or compiled.
+"""Image of a point and its derivatives: formulas for arrays and for compiled loops.
 
-The functions take numbers or arrays alike. `image_rows` evaluates them for many image points, over
-whole arrays, or one image point at a time when loops can be compiled. Symbols, forms of distortion
-and conventions are those of tankcal.camera.model.
+The functions accept numbers or arrays. `image_rows` evaluates them for many image points, over
+whole arrays, or for single image points if loops can be compiled. Symbols, forms of distortion and
+conventions are defined in tankcal.camera.model.
 """
 
 import sys
@@ -11,38 +11,38 @@ import numpy as np
 
 from tankcal.solver.compiled import compile_functions, is_worth_compiling
 
-LANES = 64  # image points of a photo that are computed side by side
+LANES = 64  # image points of a photo computed together, for vector instructions
 
 
 def apply_first_affinity(x, y, q, form):
-    """The measured point, from the principal point, after the affinity before the distortion.
+    """Apply the affinity before the distortion to a point relative to the principal point.
 
     Parameters
     ----------
     x, y : float or ndarray, shape (n,)
-        The point, mm.
+        Point, mm.
     q : sequence of 13
-        Interior parameters in the order of PARAMETERS, numbers or (n,).
+        Interior parameters in the order of PARAMETERS, numbers or arrays (n,).
     form : sequence of 8
         See Form.numbers.
 
     Returns
     -------
     x, y : float or ndarray, shape (n,)
-        (1 + A) x + B y and y, mm; x and y where the form has no such affinity.
+        (1 + A) x + B y and y, mm; x and y for a form without this affinity.
     """
     return (1.0 + form[6] * q[11]) * x + form[6] * q[12] * y, y
 
 
 def distort(x, y, q, form):
-    """Distortion of points from the principal point, and its derivatives by x and y.
+    """Distortion of points relative to the principal point, and its derivatives by x and y.
 
     Parameters
     ----------
     x, y : float or ndarray, shape (n,)
-        The point, mm.
+        Point, mm.
     q : sequence of 13
-        Interior parameters in the order of PARAMETERS, numbers or (n,).
+        Interior parameters in the order of PARAMETERS, numbers or arrays (n,).
     form : sequence of 8
         See Form.numbers.
 
@@ -54,11 +54,15 @@ def distort(x, y, q, form):
     k1, k2, k3, k4, p1, p2, p3, p4, a, b = q[3:13]
     _, ax, ay, bxy, byx, by, _, e = form
     r2 = x * x + y * y
+    # Radial factor minus its value at R0, both by Horner's scheme; e = R0^2.
     radial = r2 * (k1 + r2 * (k2 + r2 * (k3 + r2 * k4))) - e * (k1 + e * (k2 + e * (k3 + e * k4)))
+    # Derivative of the radial factor by r2, times 2: d radial/dx = x slope.
     slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * (3.0 * k3 + r2 * 4.0 * k4)))
+    # Decentring without its factor m = 1 + P3 r2 + P4 r4; dm is the derivative like slope.
     tx = p1 * (r2 + 2.0 * x * x) + 2.0 * p2 * x * y
     ty = p2 * (r2 + 2.0 * y * y) + 2.0 * p1 * x * y
     m, dm = 1.0 + r2 * (p3 + r2 * p4), 2.0 * (p3 + 2.0 * r2 * p4)
+    # Common part of d dx/dy and d dy/dx.
     cross = x * y * slope + 2.0 * (p1 * y + p2 * x) * m
     return (
         x * radial + tx * m + a * (ax * x + ay * y) + b * bxy * y,
@@ -71,7 +75,18 @@ def distort(x, y, q, form):
 
 
 def distortion_derivatives(x, y, q, form):
-    """Derivatives of the distortion by K1..K4, P1..P4, A, B: ten for dx and ten for dy."""
+    """Derivatives of the distortion by K1..K4, P1..P4, A, B.
+
+    Parameters
+    ----------
+    x, y, q, form
+        As for `distort`.
+
+    Returns
+    -------
+    tuple of two tuples of ten
+        Derivatives of dx, and of dy.
+    """
     p1, p2, p3, p4 = q[7:11]
     _, ax, ay, bxy, byx, by, _, e = form
     r2 = x * x + y * y
@@ -87,22 +102,22 @@ def distortion_derivatives(x, y, q, form):
 
 
 def undistorted_by(x, y, q, form):
-    """The point whose correction gives an ideal point, by Newton's method.
+    """Point whose correction gives an ideal point, by Newton's method.
 
     Parameters
     ----------
     x, y : float or ndarray, shape (n,)
-        The ideal point, mm.
+        Ideal point, mm.
     q, form
         As for `distort`.
 
     Returns
     -------
     x, y : float or ndarray, shape (n,)
-        The measured point, from the principal point, mm.
+        Measured point relative to the principal point, mm.
     """
-    # six steps, quadratic: a distortion of 30 % of the radius is solved to the last digit; one by
-    # one, for points with a loop each are not compiled to be computed side by side
+    # Six quadratic steps solve a distortion of 30 % of the radius to the last digit. The steps are
+    # written one by one, because the compiler does not vectorise a loop for each point.
     px, py = _newton_step(x, y, x, y, q, form)
     px, py = _newton_step(px, py, x, y, q, form)
     px, py = _newton_step(px, py, x, y, q, form)
@@ -112,8 +127,10 @@ def undistorted_by(x, y, q, form):
 
 
 def _newton_step(px, py, x, y, q, form):
+    """One Newton step for p + side d(p) = (x, y), from p = (px, py)."""
     side = form[0]
     dx, dy, dxx, dxy, dyx, dyy = distort(px, py, q, form)
+    # Jacobian [a b; c d] of the left side, and the residual (ex, ey).
     a, b, c, d = 1.0 + side * dxx, side * dxy, side * dyx, 1.0 + side * dyy
     ex, ey = px + side * dx - x, py + side * dy - y
     determinant = a * d - b * c
@@ -121,12 +138,12 @@ def _newton_step(px, py, x, y, q, form):
 
 
 def image_point(x, y, q, form, of_ideal):
-    """The measured coordinate of an ideal point, and its derivatives.
+    """Measured coordinates of an ideal point, and their derivatives.
 
     Parameters
     ----------
     x, y : float or ndarray, shape (n,)
-        The ideal point, from the principal point, mm.
+        Ideal point relative to the principal point, mm.
     q, form
         As for `distort`.
     of_ideal : bool
@@ -135,9 +152,9 @@ def image_point(x, y, q, form, of_ideal):
     Returns
     -------
     tuple of twelve
-        The measured x and y (frame of the image), the point (two) at which the distortion holds,
-        the derivatives d x/d xi, d x/d eta, d y/d xi, d y/d eta, and those by the distortion
-        there, d x/d dx, d x/d dy, d y/d dx, d y/d dy.
+        Measured x and y in the frame of the image; x and y of the point of evaluation of the
+        distortion; d x/d xi, d x/d eta, d y/d xi, d y/d eta; d x/d dx, d x/d dy, d y/d dx, d y/d dy
+        by the distortion at this point.
     """
     if of_ideal:
         dx, dy, dxx, dxy, dyx, dyy = distort(x, y, q, form)
@@ -149,13 +166,16 @@ def image_point(x, y, q, form, of_ideal):
         px, py = undistorted_by(x, y, q, form)
         _, _, dxx, dxy, dyx, dyy = distort(px, py, q, form)
         a, b, c, d = 1.0 + side * dxx, side * dxy, side * dyx, 1.0 + side * dyy
+        # Implicit differentiation of p + side d(p) = ideal: dp = J^-1 (d ideal - side d_K).
         t = 1.0 / (a * d - b * c)
         mx, my = q[1] + px, q[2] + py
         a, b, c, d = d * t, -b * t, -c * t, a * t
         e, f, g, h = -side * a, -side * b, -side * c, -side * d
+    # Without an affinity before the distortion.
     if form[6] == 0.0:
         return mx, my, px, py, a, b, c, d, e, f, g, h
-    s, k = 1.0 / (1.0 + q[11]), q[12]  # what led does, undone
+    # Inverse of apply_first_affinity: x = s (x' - B y), s = 1/(1 + A).
+    s, k = 1.0 / (1.0 + q[11]), q[12]
     mx = q[1] + s * (mx - q[1] - k * (my - q[2]))
     a, b, e, f = s * (a - k * c), s * (b - k * d), s * (e - k * g), s * (f - k * h)
     return mx, my, px, py, a, b, c, d, e, f, g, h
@@ -166,15 +186,20 @@ def ideal_point(u, v, w, r, c):
 
     Parameters
     ----------
-    r
-        The nine elements of R, row by row, numbers or (n,).
+    u, v, w : float or ndarray, shape (n,)
+        Coordinates in the camera system, m.
+    r : sequence of nine
+        Elements of R, row by row, numbers or arrays (n,).
+    c : float or ndarray, shape (n,)
+        Principal distance, mm.
 
     Returns
     -------
-    tuple of tuples
-        xi, eta and, for each of them, the derivatives by X (3), rotation (3) and c; those by S are
-        those by X with the other sign.
+    tuple
+        xi, eta (mm) and a tuple of derivatives for each: by X (3), rotation (3) and c. The
+        derivatives by S have the opposite sign of those by X.
     """
+    # xi = c x, eta = c y; d xi/dX = -c/w (row 1 of R + x row 3 of R).
     x, y, f = -u / w, -v / w, c / w
     xy = c * x * y
     return (
@@ -202,55 +227,71 @@ def ideal_point(u, v, w, r, c):
 
 
 def image_point_derivatives(p, r, q, form, of_ideal):
-    """Measured coordinate of a point and all its derivatives.
+    """Measured coordinates of a point and all derivatives.
 
     Parameters
     ----------
-    p
-        X - S, three numbers or (n,) (m).
-    r
-        Nine elements of R, row by row.
-    q
-        13 interior parameters.
+    p : sequence of three
+        X - S, numbers or arrays (n,), m.
+    r : sequence of nine
+        Elements of R, row by row.
+    q : sequence of 13
+        Interior parameters.
+    form, of_ideal
+        As for `image_point`.
 
     Returns
     -------
-    tuple of tuples
-        x, y (mm) and for each 3 + 3 + 13 derivatives: by X, rotation, interior parameters.
+    tuple
+        x, y (mm) and 3 + 3 + 13 derivatives for each: by X, rotation and interior parameters.
     """
+    # (u, v, w) = R (X - S).
     u = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
     v = r[3] * p[0] + r[4] * p[1] + r[5] * p[2]
     w = r[6] * p[0] + r[7] * p[1] + r[8] * p[2]
     xi, eta, dxi, deta = ideal_point(u, v, w, r, q[0])
     x, y, px, py, a, b, c, d, e, f, g, h = image_point(xi, eta, q, form, of_ideal)
     kx, ky = distortion_derivatives(px, py, q, form)
+    # Chain rule: coordinate by distortion, distortion by its parameters.
     by_kx = ten(e, f, kx, ky)
-    led_by = form[6] / (1.0 + form[6] * q[11])
-    by_a, by_b = by_kx[8] - led_by * (x - q[1]), by_kx[9] - led_by * (y - q[2])
-    one, zero = 1.0 + 0.0 * x, 0.0 * x
+    # The affinity before the distortion: derivatives of x = s (x' - B y) by A and B.
+    affinity_factor = form[6] / (1.0 + form[6] * q[11])
+    by_a, by_b = by_kx[8] - affinity_factor * (x - q[1]), by_kx[9] - affinity_factor * (y - q[2])
+    unit, zero = 1.0 + 0.0 * x, 0.0 * x
     return (
         x,
         y,
-        seven(a, b, dxi, deta) + (one, zero) + by_kx[:8] + (by_a, by_b),
-        seven(c, d, dxi, deta) + (zero, one) + ten(g, h, kx, ky),
+        seven(a, b, dxi, deta) + (unit, zero) + by_kx[:8] + (by_a, by_b),
+        seven(c, d, dxi, deta) + (zero, unit) + ten(g, h, kx, ky),
     )
 
 
 def ideal_point_derivatives(p, r, q, measured, form, of_ideal):
-    """Misclosure of the ideal image: the ideal point of the ground less that of the measured
-    coordinate, which depends on the interior parameters, too, and all its derivatives.
+    """Misclosure in the ideal image and all derivatives.
 
-    With y the measured coordinate from the principal point, after an affinity before the
-    distortion where there is one, a correction gives p = y + side d(y),
-    so that dp = -(1 + side d') d(x0, y0) + side d_K; a distortion of the ideal point p + d(p) = y,
-    so that dp = (1 + d')^-1 (-d(x0, y0) - d_K).
+    The misclosure is the ideal point of the object point minus the corrected measured point, which
+    also depends on the interior parameters.
 
     Parameters
     ----------
     p, r, q
-        As for one_image_point.
-    measured
-        x and y, two numbers or (n,) mm.
+        As for image_point_derivatives.
+    measured : sequence of two
+        Measured x and y, numbers or arrays (n,), mm.
+    form, of_ideal
+        As for `image_point`.
+
+    Returns
+    -------
+    tuple
+        Misclosures in x and y (mm), and 3 + 3 + 13 derivatives for each.
+
+    Notes
+    -----
+    y is the measured coordinate relative to the principal point, after the affinity before the
+    distortion, if any. A correction gives p = y + side d(y), so that dp = -(1 + side d') d(x0, y0)
+    + side d_K. A distortion of the ideal point satisfies p + d(p) = y, so that dp = (1 + d')^-1
+    (-d(x0, y0) - d_K).
     """
     u = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
     v = r[3] * p[0] + r[4] * p[1] + r[5] * p[2]
@@ -266,7 +307,7 @@ def ideal_point_derivatives(p, r, q, measured, form, of_ideal):
         _, _, dxx, dxy, dyx, dyy = distort(x, y, q, form)
         a, b, c, d = 1.0 + dxx, dxy, dyx, 1.0 + dyy
         t = 1.0 / (a * d - b * c)
-        a, b, c, d = d * t, -b * t, -c * t, a * t  # of dp by dy
+        a, b, c, d = d * t, -b * t, -c * t, a * t  # derivatives of p by y
         corrected_x, corrected_y = x, y
         e, f, g, h = a, b, c, d
     else:
@@ -277,6 +318,7 @@ def ideal_point_derivatives(p, r, q, measured, form, of_ideal):
         e, f, g, h = zero - side, zero, zero, zero - side
     kx, ky = distortion_derivatives(x, y, q, form)
     by_kx, by_ky = ten(e, f, kx, ky), ten(g, h, kx, ky)
+    # Derivatives of the affinity before the distortion; x0 and y0 act through it.
     scale, skew = 1.0 + form[6] * q[11], form[6] * q[12]
     by_a, by_b = form[6] * from_x, form[6] * from_y
     return (
@@ -288,7 +330,7 @@ def ideal_point_derivatives(p, r, q, measured, form, of_ideal):
 
 
 def seven(a, b, p, q):
-    """a p + b q, element by element: seven numbers or arrays."""
+    """Linear combination a p + b q of seven elements, numbers or arrays."""
     return (
         a * p[0] + b * q[0],
         a * p[1] + b * q[1],
@@ -301,7 +343,7 @@ def seven(a, b, p, q):
 
 
 def ten(a, b, p, q):
-    """a p + b q, element by element: ten numbers or arrays."""
+    """Linear combination a p + b q of ten elements, numbers or arrays."""
     return seven(a, b, p[:7], q[:7]) + (
         a * p[7] + b * q[7],
         a * p[8] + b * q[8],
@@ -310,8 +352,11 @@ def ten(a, b, p, q):
 
 
 def _keep(lane, l, x, y, dx, dy):
-    """Write what is computed of image point l, number by number: what has a place that the compiler
-    knows is computed side by side."""
+    """Store the results for image point l.
+
+    The elements are stored one by one, because the compiler can vectorise assignments to constant
+    places.
+    """
     lane[3, l], lane[4, l] = x, y
     lane[5, l], lane[24, l] = dx[0], dy[0]
     lane[6, l], lane[25, l] = dx[1], dy[1]
@@ -338,15 +383,16 @@ def _loop(
     xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac,
     in_ideal,
 ):  # fmt: skip
-    """image_rows, for up to LANES neighbouring image points of a photo at a time.
+    """Compute `image_rows` for up to LANES neighbouring image points of a photo at a time.
 
-    Rows of lane: X - S (3), the measured point and in its place the misclosure (2), derivatives of
-    x (19), of y (19). Places are named one by one: a part of an array costs more than a number.
+    Rows of lane: X - S (3), measured point and later its misclosure (2), derivatives of x (19) and
+    of y (19). Elements are named one by one, because slices of arrays cost more than numbers.
     """
     lane = np.empty((43, LANES))
     end, n = 0, len(point)
     while end < n:
         begin, f = end, photo[end]
+        # Collect neighbouring image points of the same photo.
         while end < n and end - begin < LANES and photo[end] == f:
             end += 1
         turn = (
@@ -354,7 +400,7 @@ def _loop(
             rotation[f, 1, 0], rotation[f, 1, 1], rotation[f, 1, 2],
             rotation[f, 2, 0], rotation[f, 2, 1], rotation[f, 2, 2],
         )  # fmt: skip
-        own = (
+        parameters = (
             interior[f, 0], interior[f, 1], interior[f, 2], interior[f, 3], interior[f, 4],
             interior[f, 5], interior[f, 6], interior[f, 7], interior[f, 8], interior[f, 9],
             interior[f, 10], interior[f, 11], interior[f, 12],
@@ -365,13 +411,15 @@ def _loop(
             lane[1, l] = xyz[j, 1] - photo_xyz[f, 1]
             lane[2, l] = xyz[j, 2] - photo_xyz[f, 2]
             lane[3, l], lane[4, l] = xy[begin + l, 0], xy[begin + l, 1]
-        _side_by_side(lane, end - begin, turn, own, form, of_ideal, in_ideal)
+        _side_by_side(lane, end - begin, turn, parameters, form, of_ideal, in_ideal)
         for l in range(end - begin):
             i = begin + l
             wx, wy = weight[i, 0], weight[i, 1]
             w[i, 0], w[i, 1] = lane[3, l] * wx, lane[4, l] * wy
             if len(jac) == 0:
                 continue
+            # Weights turn derivatives into whitened derivatives; position S has the opposite sign
+            # of X.
             for k in range(3):
                 gx, gy = lane[5 + k, l] * wx, lane[24 + k, l] * wy
                 jac[i, 0, k], jac[i, 1, k] = gx, gy
@@ -382,25 +430,26 @@ def _loop(
                 jac[i, 1, 9 + k] = lane[30 + active[k], l] * wy
 
 
-def _side_by_side(lane, n, turn, own, form, of_ideal, in_ideal):
+def _side_by_side(lane, n, turn, parameters, form, of_ideal, in_ideal):
     """Misclosures and derivatives of n image points of a photo, in the rows of lane."""
+    # The case is chosen outside the loops.
     if in_ideal:
         for l in range(n):
             x, y, dx, dy = ideal_point_derivatives(
-                (lane[0, l], lane[1, l], lane[2, l]), turn, own, (lane[3, l], lane[4, l]),
+                (lane[0, l], lane[1, l], lane[2, l]), turn, parameters, (lane[3, l], lane[4, l]),
                 form, of_ideal,
             )  # fmt: skip
             _keep(lane, l, x, y, dx, dy)
     elif of_ideal:
         for l in range(n):
             x, y, dx, dy = image_point_derivatives(
-                (lane[0, l], lane[1, l], lane[2, l]), turn, own, form, True
+                (lane[0, l], lane[1, l], lane[2, l]), turn, parameters, form, True
             )
             _keep(lane, l, x - lane[3, l], y - lane[4, l], dx, dy)
     else:
         for l in range(n):
             x, y, dx, dy = image_point_derivatives(
-                (lane[0, l], lane[1, l], lane[2, l]), turn, own, form, False
+                (lane[0, l], lane[1, l], lane[2, l]), turn, parameters, form, False
             )
             _keep(lane, l, x - lane[3, l], y - lane[4, l], dx, dy)
 
@@ -427,7 +476,7 @@ def _arrays(
     xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac,
     in_ideal,
 ):  # fmt: skip
-    """image_rows, over whole arrays."""
+    """Compute `image_rows` over whole arrays."""
     p = (xyz[point] - photo_xyz[photo]).T
     r = rotation.reshape(-1, 9)[photo].T
     p, r, q = tuple(p), tuple(r), tuple(interior[photo].T)
@@ -448,12 +497,12 @@ def _arrays(
 
 
 def image_rows(*arguments, in_ideal=False):
-    """Whitened misclosures of image coordinates, computed minus measured, and their derivatives.
+    """Whitened misclosures of image coordinates, computed minus measured, and derivatives.
 
     Parameters
     ----------
     xyz : ndarray, shape (points, 3)
-        Ground points, m.
+        Object points, m.
     photo_xyz : ndarray, shape (photos, 3)
         Projection centres, m.
     rotation : ndarray, shape (photos, 3, 3)
@@ -469,20 +518,20 @@ def image_rows(*arguments, in_ideal=False):
     xy : ndarray, shape (n, 2)
         Measured image points, mm.
     weight : ndarray, shape (n, 2)
-        1/sd, 1/mm.
+        Inverse standard deviations, 1/mm.
     active : ndarray of int, shape (k,)
-        Places of the interior parameters asked for.
+        Indices of the required interior parameters.
     w : ndarray, shape (n, 2)
-        Filled with the misclosures.
+        Output: misclosures.
     jac : ndarray, shape (n, 2, 9 + k)
-        Filled with the derivatives by point (3), photo (position 3, rotation 3) and interior
-        parameters (k); of length 0: left out.
+        Output: derivatives by point (3), photo (position 3, rotation 3) and interior parameters
+        (k). Not computed for length 0.
     in_ideal : bool, optional
-        Misclosures of the ideal image (`ideal_point_derivatives`) instead of the measured one.
+        If True, misclosures refer to the ideal image (`ideal_point_derivatives`).
     """
     if is_worth_compiling(len(arguments[6])):
         loops = compile_functions(sys.modules[__name__], _COMPILED)
-        state = (np.ascontiguousarray(one) for one in arguments[:4])  # compiled for these alone
+        state = (np.ascontiguousarray(array) for array in arguments[:4])  # compiled for these alone
         loops._loop(*state, *arguments[4:], in_ideal)
     else:
         _arrays(*arguments, in_ideal)

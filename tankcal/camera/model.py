@@ -1,30 +1,33 @@
-"""Cameras: interior orientation, distortion in all published forms, the image of a point.
+"""Camera model: interior orientation, all published forms of distortion, and image of a point.
 
-With (u, v, w) = R (X - S) the ideal image point, counted from the principal point, is
+With (u, v, w) = R (X - S), the ideal image point relative to the principal point is
 
     xi = -c u / w,   eta = -c v / w
 
-and the distortion of a point (x, y), with r2 = x2 + y2, is the sum of
+The distortion of a point (x, y), with r2 = x2 + y2, is the sum of
 
     radial      x (K1 r2 + K2 r4 + K3 r6 + K4 r8)      balanced about R0: K1 (r2 - R0^2) + ...
     decentring  (P1 (r2 + 2 x2) + 2 P2 x y) (1 + P3 r2 + P4 r4), y alike with P1 and P2 swapped
     affinity    A y, B y ("both_y", Silva 40-44);  A x, B x ("both_x", Pessoa 6);
                 A x + B y, 0 ("b1_b2")              written as (dx, dy)
 
-With the affinity "before_distortion" (DBAT) it is no part of the sum: in every convention the
-measured coordinate, from the principal point, is first replaced by (1 + A) x + B y, y.
+The affinity "before_distortion" (DBAT) is not part of the sum. In every convention, it first
+replaces the measured coordinates, relative to the principal point, by (1 + A) x + B y and y.
 
-Three conventions say which point that is, and on which side it stands:
+Three conventions define the point of evaluation and the sign of the distortion:
 
     distortion_of_ideal    x = x0 + xi + d(xi)               OpenCV, AICON
     correction_added       (x - x0) + d(x - x0) = xi         Silva 39, DBAT
     correction_subtracted  (x - x0) - d(x - x0) = xi         Pessoa 10
 
-The last two are solved for the measured coordinate x, so every convention is a function of the
-unknowns and the misclosure is "computed minus measured", in the image as it was measured. With
-weights "ideal" it is counted in the ideal image: xi less the corrected measured coordinate.
+The last two equations are solved for the measured coordinate x. In every convention, x is then a
+function of the unknowns. The misclosure is "computed minus measured" in the measured image. With
+the weights "ideal", the misclosure refers to the ideal image: xi minus the corrected measured
+coordinate.
 
-Image coordinates and c, x0, y0, R0 in mm; K1 mm^-2, K2 mm^-4 ...; P1, P2 mm^-1, P3 mm^-2, P4 mm^-4.
+Image coordinates and c, x0, y0, R0 are in mm; K1 mm^-2, K2 mm^-4 ...; P1, P2 mm^-1, P3 mm^-2, P4
+mm^-4.
+
 Source: Silva 1995 (39-47, 58); Pessoa 2017 (3-6, 9, 10); Brown 1971; DBAT, res_euler_brown_1.
 """
 
@@ -40,7 +43,8 @@ _UNITS = ("mm", "mm", "mm", "mm-2", "mm-4", "mm-6", "mm-8", "mm-1", "mm-1", "mm-
 UNITS = dict(zip(PARAMETERS, _UNITS, strict=True))
 CONVENTIONS = {"distortion_of_ideal": 0.0, "correction_added": 1.0, "correction_subtracted": -1.0}
 WEIGHTS = ("measured", "ideal")
-# (dx by A x, dx by A y, dx by B y, dy by B x, dy by B y, A x + B y before the distortion)
+# Switches: A x in dx, A y in dx, B y in dx, B x in dy, B y in dy, and A x + B y before the
+# distortion.
 AFFINITIES = {
     "both_y": (0.0, 1.0, 0.0, 0.0, 1.0, 0.0),
     "both_x": (1.0, 0.0, 0.0, 1.0, 0.0, 0.0),
@@ -51,7 +55,7 @@ AFFINITIES = {
 
 @dataclass(frozen=True)
 class Form:
-    """How the distortion of a camera is written.
+    """Form of the distortion of a camera.
 
     Attributes
     ----------
@@ -60,9 +64,9 @@ class Form:
     affinity : str
         One of AFFINITIES.
     radial_balance_mm : float
-        R0, the radius without radial distortion, mm; 0 where none is named.
+        R0, the radius without radial distortion, mm; 0 without a balance.
     weights : str
-        One of WEIGHTS: the image in which residuals are counted and weighed.
+        One of WEIGHTS: the image to which residuals and weights refer.
     """
 
     convention: str = "distortion_of_ideal"
@@ -72,22 +76,22 @@ class Form:
 
     @property
     def numbers(self):
-        """Eight: side (0, +1, -1), the six affinity switches, R0^2: what the formulas take."""
+        """Form as eight numbers: sign (0, +1, -1), the six affinity switches, and R0^2."""
         side, balance = CONVENTIONS[self.convention], float(self.radial_balance_mm)
         return side, *AFFINITIES[self.affinity], balance**2
 
 
 def correct_image_points(xy_mm, interior, form):
-    """Ideal image points, from the principal point, of measured ones.
+    """Ideal image points, relative to the principal point, from measured image points.
 
     Parameters
     ----------
     xy_mm : ndarray, shape (n, 2)
-        Image points as measured, mm.
+        Measured image points, mm.
     interior : array_like, shape (13,) or (n, 13)
         Interior parameters in the order of PARAMETERS.
     form : Form
-        How the distortion is written.
+        Form of the distortion.
 
     Returns
     -------
@@ -104,23 +108,25 @@ def correct_image_points(xy_mm, interior, form):
     numbers = form.numbers
     q = tuple(np.asarray(interior, dtype=float).T)
     x, y = apply_first_affinity(xy_mm[:, 0] - q[1], xy_mm[:, 1] - q[2], q, numbers)
+    # A correction is a function of the measured point and is applied directly.
     if form.convention != "distortion_of_ideal":
         dx, dy = distort(x, y, q, numbers)[:2]
         return np.column_stack([x + numbers[0] * dx, y + numbers[0] * dy])
+    # A distortion of the ideal point is inverted: p + d(p) = measured, hence the sign +1.
     return np.column_stack(undistorted_by(x, y, q, (1.0, *numbers[1:])))
 
 
 def distort_image_points(ideal_mm, interior, form):
-    """Measured image points of ideal ones: the inverse of `corrected`.
+    """Measured image points from ideal image points: the inverse of `correct_image_points`.
 
     Parameters
     ----------
     ideal_mm : ndarray, shape (n, 2)
-        Ideal image points, counted from the principal point, mm.
+        Ideal image points, relative to the principal point, mm.
     interior : array_like, shape (13,) or (n, 13)
         Interior parameters in the order of PARAMETERS.
     form : Form
-        How the distortion is written.
+        Form of the distortion.
 
     Returns
     -------
@@ -140,81 +146,90 @@ def distort_image_points(ideal_mm, interior, form):
 
 
 def balanced_about(interior, form, radius_mm):
-    """The same camera with its radial distortion balanced about another radius R0.
-
-    What R0 takes out of the radial terms, s = 1 - (K1 R0^2 + ...), is a change of scale, which c
-    takes: exact, whatever the convention (in the one that subtracts K counts with the other sign).
+    """Balance the radial distortion of a camera about another radius R0.
 
     Parameters
     ----------
     interior : array_like, shape (13,)
         Interior parameters in the order of PARAMETERS.
     form : Form
-        How the distortion is written.
+        Form of the distortion.
     radius_mm : float
-        The new R0, mm; 0 gives the plain form.
+        New R0, mm; 0 for the form without a balance.
 
     Returns
     -------
     interior : ndarray, shape (13,)
-        The parameters about the new radius.
+        Parameters for the new radius.
     form : Form
-        The form with this radius.
+        Form with this radius.
+
+    Notes
+    -----
+    The balance removes a change of scale s = 1 - (K1 R0^2 + ...) from the radial terms. c takes up
+    this scale exactly, in every convention. With correction_subtracted, K has the opposite sign.
 
     Examples
     --------
     >>> interior = np.zeros(13)
     >>> interior[[0, 3]] = 50.0, -1e-4
-    >>> found, form = balanced_about(interior, Form("correction_added"), 10.0)
-    >>> round(float(found[0]), 6), form.radial_balance_mm
+    >>> balanced, form = balanced_about(interior, Form("correction_added"), 10.0)
+    >>> round(float(balanced[0]), 6), form.radial_balance_mm
     (50.505051, 10.0)
     """
     side = CONVENTIONS[form.convention]
+    # First remove the present balance.
     plain = rescale_interior(
-        interior, form, 1 - (side or 1) * _at_balance(interior, form.radial_balance_mm)
+        interior, form, 1 - (side or 1) * _balance_offset(interior, form.radial_balance_mm)
     )
     target = replace(form, radial_balance_mm=float(radius_mm))
     s = 1.0
+    # The coefficients in the scale s are those after rescaling: fixed-point iteration.
     for _ in range(NEWTON_ROUNDS):
-        found = rescale_interior(plain, form, 1 / s)
-        wanted = 1 - (side or 1) * _at_balance(found, radius_mm)
-        if abs(wanted - s) < 1e-15:
+        balanced = rescale_interior(plain, form, 1 / s)
+        next_s = 1 - (side or 1) * _balance_offset(balanced, radius_mm)
+        if abs(next_s - s) < 1e-15:
             break
-        s = wanted
-    return found, target
+        s = next_s
+    return balanced, target
 
 
-def _at_balance(interior, radius_mm):
-    """K1 R0^2 + K2 R0^4 + ..."""
+def _balance_offset(interior, radius_mm):
+    """K1 R0^2 + K2 R0^4 + ... for interior parameters (13,) and the radius R0."""
+    # Horner's scheme in R0^2, from K4 to K1.
     e = radius_mm**2
     return float(np.polyval(np.append(np.asarray(interior)[6:2:-1], 0.0), e))
 
 
 def rescale_interior(interior, form, s):
-    """Interior parameters of the same camera when a scale s goes over to c.
-
-    distortion_of_ideal: s xi is the ideal point of the same image in place of xi; else the equation
-    of the correction is divided by s. An affinity before the distortion stays what it is.
+    """Interior parameters of the same camera when the scale s is moved to c.
 
     Parameters
     ----------
     interior : array_like, shape (13,)
         Interior parameters in the order of PARAMETERS.
     form : Form
-        How the distortion is written.
+        Form of the distortion.
     s : float
-        The scale.
+        Scale.
 
     Returns
     -------
     ndarray, shape (13,)
-        The parameters after it.
+        Rescaled parameters.
+
+    Notes
+    -----
+    With distortion_of_ideal, s xi replaces xi as the ideal point of the same image. With a
+    correction, its equation is divided by s. An affinity before the distortion is unchanged.
     """
     q = np.array(interior, dtype=float)
     if CONVENTIONS[form.convention]:
         q[0] /= s
         q[[3, 4, 5, 6, 7, 8, 11, 12]] /= s
     else:
+        # Powers of s: c gains one, and each coefficient loses the degree of its term in the
+        # coordinates.
         q *= s ** np.array([1, 0, 0, -3, -5, -7, -9, -2, -2, -2, -4, -1, -1], dtype=float)
     if form.affinity == "before_distortion":
         q[11:] = interior[11:]

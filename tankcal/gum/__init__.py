@@ -1,8 +1,9 @@
-"""The GUM: inputs and their distributions, the law of propagation, budgets, Monte Carlo.
+"""Uncertainty by the GUM: inputs and distributions, propagation, budgets, Monte Carlo.
 
-`within`, `expanded` and `standard` make a distribution of what a certificate says; `Combination` is
-the exact one of a sum; `tankcal.gum.monte_carlo` draws. The door to the law of propagation, to
-degrees of freedom, k, U and budgets is `tankcal.uncertainty`.
+`within`, `expanded` and `standard` create a distribution from the statement of a certificate.
+`Combination` is the exact distribution of a linear combination. `tankcal.gum.monte_carlo`
+simulates. The public interface to the law of propagation, degrees of freedom, k, U and budgets is
+`tankcal.uncertainty`.
 """
 
 from tankcal.gum.combination import Combination

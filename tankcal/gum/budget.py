@@ -1,4 +1,4 @@
-"""The budget of one output: what brings how much, and what is worth measuring better.
+"""Uncertainty budget of one output: contribution of each input, and potential for improvement.
 
 Source: JCGM 100:2008 5.1.3, 7.2.7, F.
 """
@@ -17,23 +17,23 @@ class BudgetRow:
     Attributes
     ----------
     name, unit, type, distribution, dof, note
-        As the input declares them; of a family, the first.
+        As declared for the input; for a family, of its first input.
     is_default : bool
-        Nobody declared it.
+        True for an assumption of the program, which nobody declared.
     estimate : float
-        In `unit`; nan of a family.
+        Estimate in `unit`; nan for a family.
     u : float
-        Standard uncertainty in `unit`; nan of a family.
+        Standard uncertainty in `unit`; nan for a family.
     sensitivity : float
-        dy/dx, unit of the output by `unit`; nan of a family.
+        Sensitivity coefficient dy/dx, unit of the output per unit of the input; nan for a family.
     contribution : float
-        |dy/dx| u, of a family sqrt(c' U c), in the unit of the output.
+        |dy/dx| u, or sqrt(c' U c) for a family, in the unit of the output.
     share : float
-        Of the variance; the shares add up to 1, negative where correlations take away.
+        Share of the variance. The shares have the sum 1; a correlation can make a share negative.
     halved : float
-        The factor of the expanded uncertainty if u were half as large: 0.9 is 10 % less.
-    correlations : tuple
-        ((name, r), ...) of the inputs that it is correlated with.
+        Factor of the expanded uncertainty if u were halved: 0.9 means a reduction by 10 %.
+    correlations : tuple of (str, float)
+        Name of each correlated input, and correlation coefficient.
     """
 
     name: str
@@ -53,16 +53,20 @@ class BudgetRow:
 
 
 class Shares:
-    """The `Source`s of one output together, and what a line of its budget has of them.
-
-    u, dof, k, U  of the output
+    """Sources of one output, and the contributions of groups of inputs.
 
     Parameters
     ----------
-    sources
-        Of one row each.
-    probability
+    sources : sequence of Source
+        Sources with a single row.
+    probability : float
         Coverage probability of U.
+
+    Attributes
+    ----------
+    u, dof, k, U : float
+        Combined standard uncertainty, effective degrees of freedom, coverage factor and expanded
+        uncertainty of the output.
     """
 
     def __init__(self, sources, probability):
@@ -75,15 +79,23 @@ class Shares:
         self.U = self.k * self.u
 
     def of_line(self, members):
-        """Contribution, share and halved of `BudgetRow`, as a dict.
+        """Contribution, share and halved of a `BudgetRow`.
 
-        members  {number of a source: numbers of its parts; None: all of it}
+        Parameters
+        ----------
+        members : dict of {int: sequence of int or None}
+            Index of each source in the line, with the indices of its parts; None: all parts.
+
+        Returns
+        -------
+        dict
         """
         square = variance = 0.0
         changed = self._variances.copy()
         for number, chosen in members.items():
             parts = self._parts_of(number, chosen)
             square, variance = square + parts[0], variance + parts[1]
+            # Variance of the source after halving u of its members.
             changed[number] = parts[2]
         return {
             "contribution": float(max(square, 0.0) ** 0.5),
@@ -92,39 +104,46 @@ class Shares:
         }
 
     def _parts_of(self, number, chosen):
-        """What parts of a source bring alone, bring with the others, and leave when halved."""
+        """Variances of parts of a source: the parts alone, with covariances, and after halving."""
         source, whole = self.sources[number], self._variances[number]
+        # Halving u of all parts quarters the variance.
         if chosen is None:
             return whole, whole, whole / 4
-        own = np.array([part.columns_m3[0, 0] for part in source.parts])
-        is_chosen = np.isin(np.arange(len(own)), chosen)
-        line, half = np.where(is_chosen, own, 0.0), np.where(is_chosen, own / 2, own)
+        contributions = np.array([part.columns_m3[0, 0] for part in source.parts])
+        is_chosen = np.isin(np.arange(len(contributions)), chosen)
+        line, half = (
+            np.where(is_chosen, contributions, 0.0),
+            np.where(is_chosen, contributions / 2, contributions),
+        )
+        # c'Rc of the parts; c'R times all contributions, which assigns half of each covariance to
+        # the line; variance of the source with the parts halved.
         return (
             line @ source.correlation @ line,
-            line @ (source.correlation @ own),
+            line @ (source.correlation @ contributions),
             half @ source.correlation @ half,
         )
 
     def _with(self, variances):
-        """U with other variances of the sources."""
+        """Expanded uncertainty for other variances of the sources."""
         return float(Combined(variances[None, :], self._found.dof).expanded(self.probability)[0])
 
 
 def budget(result, row=0, probability=0.95):
-    """The budget of one output: a line for each input, or family of inputs (points, say).
+    """Uncertainty budget of one output, with a line for each input or family of inputs.
 
     Parameters
     ----------
     result : Propagation
-    row : int
-        Which output.
-    probability : float
+        Result of the propagation.
+    row : int, optional
+        Index of the output.
+    probability : float, optional
         Coverage probability of the expanded uncertainty in `halved`.
 
     Returns
     -------
     list of BudgetRow
-        In the order of the inputs; sort by `halved` for what to improve.
+        In the order of the inputs; sorted by `halved`, the largest improvement comes first.
 
     Examples
     --------
@@ -135,34 +154,37 @@ def budget(result, row=0, probability=0.95):
     >>> [(line.name, round(line.share, 2)) for line in lines]
     [('a', 0.36), ('b', 0.64)]
     """
-    one = result.rows([row])
-    shares = Shares(_sources(one), probability)
-    lines = list(dict.fromkeys(item.line for item in one.inputs.inputs))
-    return [_line(one, name, shares) for name in lines]
+    output = result.rows([row])
+    shares = Shares(_sources(output), probability)
+    # dict.fromkeys keeps the order of the inputs.
+    lines = list(dict.fromkeys(item.line for item in output.inputs.inputs))
+    return [_line(output, name, shares) for name in lines]
 
 
-def _sources(one):
-    """The sources of one output, those of several inputs with them as their parts."""
-    inputs, contributions = one.inputs, one.sensitivities[0] * one.inputs.u
+def _sources(output):
+    """Sources of one output, with the inputs of each source as its parts."""
+    inputs, contributions = output.inputs, output.sensitivities[0] * output.inputs.u
     return [
         replace(
             source,
             parts=tuple(Source(inputs.names[i], contributions[[[i]]]) for i in group),
             correlation=inputs.correlation[np.ix_(group, group)],
         )
-        for source, group in zip(one.sources, inputs.groups, strict=True)
+        for source, group in zip(output.sources, inputs.groups, strict=True)
     ]
 
 
-def _line(one, name, shares):
-    inputs = one.inputs
+def _line(output, name, shares):
+    """Line of the budget for the inputs with this name."""
+    inputs = output.inputs
     members = [i for i, item in enumerate(inputs.inputs) if item.line == name]
-    first, alone = inputs.inputs[members[0]], len(members) == 1
+    first, is_single = inputs.inputs[members[0]], len(members) == 1
+    # Indices of the members within each group of correlated inputs.
     places = [np.flatnonzero(np.isin(group, members)) for group in inputs.groups]
     parts = {
-        number: None if len(own) == len(inputs.groups[number]) else own
-        for number, own in enumerate(places)
-        if len(own)
+        number: None if len(members_of_source) == len(inputs.groups[number]) else members_of_source
+        for number, members_of_source in enumerate(places)
+        if len(members_of_source)
     }
     return BudgetRow(
         name=name,
@@ -172,18 +194,18 @@ def _line(one, name, shares):
         dof=float(inputs.dof[members].min()),
         note=first.note,
         is_default=first.is_default,
-        estimate=float(inputs.estimates[members[0]]) if alone else np.nan,
-        u=float(inputs.u[members[0]]) if alone else np.nan,
-        sensitivity=float(one.sensitivities[0, members[0]]) if alone else np.nan,
+        estimate=float(inputs.estimates[members[0]]) if is_single else np.nan,
+        u=float(inputs.u[members[0]]) if is_single else np.nan,
+        sensitivity=float(output.sensitivities[0, members[0]]) if is_single else np.nan,
         correlations=_correlations(inputs, members),
         **shares.of_line(parts),
     )
 
 
 def _correlations(inputs, members):
-    """What a line of one input is correlated with; () of a family, whose members are together."""
+    """Correlations of a line with a single input; () for a family."""
     if len(members) > 1:
         return ()
     row = inputs.correlation[members[0]]
-    others = (i for i in range(len(row)) if i != members[0] and row[i])
-    return tuple((inputs.names[i], float(row[i])) for i in others)
+    partners = (i for i in range(len(row)) if i != members[0] and row[i])
+    return tuple((inputs.names[i], float(row[i])) for i in partners)

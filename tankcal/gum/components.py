@@ -1,14 +1,14 @@
-"""Components of uncertainty: sources, alone and correlated, and what they make together.
+"""Components of uncertainty: independent and correlated sources, and their combination.
 
-Table, budget and `propagate` all state u, degrees of freedom, k and U by `Combined`; deliveries
-and the calculator, which work on sums kept for speed, by the same `sum_of_fourths` and `dof_of`.
+Tables, budgets and `propagate` compute u, degrees of freedom, k and U with `Combined`. Deliveries
+and the calculator, which store sums for speed, use `sum_of_fourths` and `dof_of`.
 
-Inputs that are correlated are one component: its variance has their covariances in it, and its
-degrees of freedom are the least of theirs (`together_dof`). Of inputs whose covariance was
-estimated together these are equal, and c' S c is a chi-square of just as many (S is of Wishart's
-distribution). Of unequal ones no rule was found that neither falls short nor is long; of five that
-were simulated the least fell short the least often, however the variances and the correlation had
-been estimated (docs/uncertainty.md).
+Correlated inputs form one component. Its variance contains their covariances. Its degrees of
+freedom are the smallest among the inputs (`together_dof`). If the covariance of the inputs was
+estimated jointly, the degrees of freedom are equal, and c' S c has a chi-square distribution with
+this number of degrees of freedom (S has a Wishart distribution). For unequal degrees of freedom, no
+rule is both safe and short. Of five simulated rules, the smallest value fell short least often, for
+every method of estimating the variances and the correlation (docs/uncertainty.md).
 
 Source: JCGM 100:2008 (GUM) 5.1, 5.2.
 """
@@ -20,40 +20,42 @@ import numpy as np
 
 from tankcal.gum.coverage import coverage_factor, dof_of, least_of, sum_of_fourths
 
-BLOCK = 1024  # rows at once: copies of them stay in the processor's cache
-NO_EIGENVALUE = 1e-12  # of the largest: what rounding leaves where there is none is below it
-ROUNDING = 1e-12  # of the largest volume of a table: less than that is lost in its digits
+BLOCK = 1024  # rows processed together, so that their copies stay in the cache
+NO_EIGENVALUE = 1e-12  # relative to the largest eigenvalue; smaller eigenvalues are rounding
+ROUNDING = 1e-12  # relative to the largest volume of a table; smaller values are rounding
 
 
 @dataclass(frozen=True)
 class Source:
-    """One cause of uncertainty, with one or more columns of the factor that belong together.
+    """One source of uncertainty, with one or more columns of the factor of the covariance.
 
     Attributes
     ----------
     kind : str
-        "points", "form", ... or the name of a declared input; "a & b" of correlated ones.
+        "points", "form", ... or the name of a declared input; "a & b" for correlated inputs.
     columns_m3 : ndarray, shape (rows, c)
-        Derivative of the output times standard uncertainty, in the unit of the output: m3 in a
-        table.
+        Derivative of the output times standard uncertainty, in the unit of the output (m3 in a
+        table).
     dof : float
         Degrees of freedom.
     u, unit : float and str, or None
-        As declared; None for what was not declared but computed.
+        As declared; None for a computed source.
     type : str
-        "A" or "B".
+        Type of evaluation, "A" or "B".
     distribution : str
+        Name of the distribution.
     note : str
+        Note of the declaration.
     estimate : float or None
-        Value of the input, in `unit`; None where it has none.
+        Value of the input, in `unit`; None without a value.
     is_default : bool
-        True for an input that nobody declared: tankcal's own assumption.
+        True for an assumption of tankcal, which nobody declared.
     parts : tuple of Source
-        Of correlated inputs each by itself; else ().
+        Each of the correlated inputs; else ().
     correlation : ndarray, shape (parts, parts), or None
-        Of these.
+        Correlation matrix of the parts.
     u_is : str
-        What u is of Student's t: "scale", or "sd": then `dof` is the shape of it alone.
+        Meaning of u for Student's t: "scale" or "sd". With "sd", `dof` is only the shape.
     """
 
     kind: str
@@ -72,27 +74,38 @@ class Source:
 
     @property
     def u_dof(self):
-        """Degrees of freedom of u; inf of a declared standard deviation, which is no estimate."""
+        """Degrees of freedom of u; inf for a declared standard deviation, which is no estimate."""
         return np.inf if self.u_is == "sd" else self.dof
 
     def mapped(self, function):
-        """The same cause with function(columns) for its columns and those of its parts."""
+        """Apply a function to the columns of the source and of its parts.
+
+        Parameters
+        ----------
+        function : callable
+            function(columns) -> new columns.
+
+        Returns
+        -------
+        Source
+        """
         parts = tuple(part.mapped(function) for part in self.parts)
         return replace(self, columns_m3=function(self.columns_m3), parts=parts)
 
     def weighted(self, weights):
-        """The same cause of weights (new rows, rows) @ rows."""
+        """Source of weighted sums of the rows, for weights (new rows, rows)."""
         return self.mapped(lambda columns: weights @ columns)
 
 
 def scale_source(source, factors):
-    """A cause of which each u is so many times what it is; degrees of freedom stay.
+    """Multiply the standard uncertainty of a source; the degrees of freedom stay unchanged.
 
     Parameters
     ----------
     source : Source
+        The source.
     factors : sequence of float
-        One, or of correlated inputs one for each part: their correlation stays, too.
+        One factor, or a factor for each part of correlated inputs; the correlation stays unchanged.
 
     Returns
     -------
@@ -100,7 +113,7 @@ def scale_source(source, factors):
 
     Examples
     --------
-    Of two inputs with r = 1 that bring 3 and 4, the second one halved:
+    Two inputs with r = 1 and contributions 3 and 4, the second contribution halved:
 
     >>> a, b = Source("a", np.array([[3.0]])), Source("b", np.array([[4.0]]))
     >>> (both,) = group_correlated({"a": a, "b": b}, [("a", "b", 1.0)])
@@ -113,57 +126,60 @@ def scale_source(source, factors):
         return replace(source, columns_m3=factor * source.columns_m3, u=u)
     pairs = zip(source.parts, factors, strict=True)
     parts = tuple(scale_source(part, [factor]) for part, factor in pairs)
-    return replace(source, columns_m3=_mixed(parts, source.correlation), parts=parts)
+    # The columns of correlated inputs are mixed, so they are computed again from the parts.
+    return replace(source, columns_m3=_correlate_columns(parts, source.correlation), parts=parts)
 
 
-def declared_source(one, derivative, estimate=None):
-    """The `Source` of a declared input.
+def declared_source(item, derivative, estimate=None):
+    """Create the `Source` of a declared input.
 
     Parameters
     ----------
-    one : object
-        With name, u (SI), u_as_read, unit, type, distribution, dof, note, is_default, u_is.
+    item : object
+        Declaration with name, u (SI), u_as_read, unit, type, distribution, dof, note, is_default
+        and u_is.
     derivative : array_like, shape (rows,) or (rows, c)
-        Of the volume by the input, m3 per SI unit.
+        Derivative of the volume by the input, m3 per SI unit.
     estimate : float, optional
-        Value of the input, in the unit it is declared in.
+        Value of the input, in the declared unit.
 
     Returns
     -------
     Source
     """
-    columns = np.asarray(derivative, dtype=float).reshape(len(derivative), -1) * one.u
+    columns = np.asarray(derivative, dtype=float).reshape(len(derivative), -1) * item.u
     return Source(
-        one.name,
+        item.name,
         columns,
-        one.dof,
-        one.u_as_read,
-        one.unit,
-        one.type,
-        one.distribution,
-        one.note,
+        item.dof,
+        item.u_as_read,
+        item.unit,
+        item.type,
+        item.distribution,
+        item.note,
         estimate,
-        one.is_default,
-        u_is=one.u_is,
+        item.is_default,
+        u_is=item.u_is,
     )
 
 
 def factor_of(covariance):
-    """Factor L of a positive semidefinite covariance, covariance = L L'.
+    """Factor L of a positive semidefinite covariance L L'.
 
     Parameters
     ----------
     covariance : ndarray, shape (n, n)
+        Covariance matrix.
 
     Returns
     -------
     ndarray, shape (n, r)
-        r its rank.
+        L, with r the rank of the covariance.
 
     Raises
     ------
     ValueError
-        When the matrix has a negative eigenvalue beyond rounding.
+        If the matrix has a negative eigenvalue larger than rounding.
 
     Examples
     --------
@@ -175,22 +191,26 @@ def factor_of(covariance):
     largest = max(values.max(initial=0.0), 0.0)
     if values.min(initial=0.0) < -1e-9 * largest:
         raise ValueError(f"not a covariance: eigenvalue {values.min():.3g} against {largest:.3g}")
+    # Eigenvectors of zero eigenvalues contribute only rounding.
     keep = values > NO_EIGENVALUE * largest
+    # The largest eigenvalue first.
     return (vectors[:, keep] * np.sqrt(values[keep]))[:, ::-1]
 
 
 def triangular(correlation):
-    """Lower triangular L of a correlation matrix R = L L' that may be singular.
+    """Lower triangular factor L of a correlation matrix R = L L', which may be singular.
 
-    Row i is a combination of the inputs before it and its own: with R = I each stands alone.
+    Row i combines input i with the inputs before it; for R = I, L is the identity.
 
     Parameters
     ----------
     correlation : ndarray, shape (n, n)
+        Correlation matrix R.
 
     Returns
     -------
     ndarray, shape (n, n)
+        L.
 
     Examples
     --------
@@ -199,28 +219,32 @@ def triangular(correlation):
     """
     lower = np.zeros_like(correlation)
     for j, column in enumerate(correlation.T):
+        # Column of the remaining matrix R - L L' of the columns so far.
         left = column - lower @ lower[j]
+        # An input that follows from the inputs before it has a zero column.
         if left[j] > 1e-9:
             lower[j:, j] = left[j:] / np.sqrt(left[j])
     return lower
 
 
 def group_correlated(sources, correlations):
-    """Sources with those that are correlated made one, for their columns mix.
-
-    With columns c_i u_i and R = L L', L lower triangular, the columns of the group are (c_i u_i) L.
-    Its degrees of freedom are those of `together_dof`.
+    """Join correlated sources to one source each, because their columns mix.
 
     Parameters
     ----------
     sources : dict of {str: Source}
-        Of one column each where correlated.
+        Sources by name; a correlated source has one column.
     correlations : iterable of (str, str, float)
-        Names of two inputs, and r.
+        Names of two inputs and their correlation coefficient.
 
     Returns
     -------
     tuple of Source
+
+    Notes
+    -----
+    With columns c_i u_i and R = L L', L lower triangular, the joint source has the columns (c_i
+    u_i) L. Its degrees of freedom follow from `together_dof`.
 
     Examples
     --------
@@ -229,36 +253,39 @@ def group_correlated(sources, correlations):
     >>> both.kind, round(float(np.sum(both.columns_m3**2)), 12)
     ('a & b', 49.0)
     """
+    # A frozenset ignores the order of the two names.
     pairs = {frozenset(pair): r for *pair, r in correlations if {*pair} <= sources.keys()}
-    done, found = set(), []
+    grouped, results = set(), []
     for name, source in sources.items():
-        if name in done:
+        if name in grouped:
             continue
-        names = _partners(name, pairs, sources)
-        done |= set(names)
-        found.append(source if len(names) == 1 else _together(names, sources, pairs))
-    return tuple(found)
+        names = _find_correlated(name, pairs, sources)
+        grouped |= set(names)
+        results.append(source if len(names) == 1 else _join_sources(names, sources, pairs))
+    return tuple(results)
 
 
-def _partners(name, pairs, order):
-    """The names that are correlated with this one, directly or through others, in their order."""
-    reached, news = set(), {name}
-    while news:
-        reached |= news
-        news = {one for pair in pairs if pair & reached for one in pair} - reached
-    return [one for one in order if one in reached]
+def _find_correlated(name, pairs, order):
+    """Names of the inputs correlated with an input, directly or through other inputs."""
+    reached, added = set(), {name}
+    # Breadth-first search; the result has the order of the sources.
+    while added:
+        reached |= added
+        added = {partner for pair in pairs if pair & reached for partner in pair} - reached
+    return [partner for partner in order if partner in reached]
 
 
-def _together(names, sources, pairs):
+def _join_sources(names, sources, pairs):
+    """Joint source of correlated inputs."""
     parts = tuple(sources[name] for name in names)
     correlation = np.eye(len(names))
-    for i, one in enumerate(names):
-        for j, other in enumerate(names):
+    for i, first in enumerate(names):
+        for j, second in enumerate(names):
             if i != j:
-                correlation[i, j] = pairs.get(frozenset((one, other)), 0.0)
+                correlation[i, j] = pairs.get(frozenset((first, second)), 0.0)
     return Source(
         " & ".join(names),
-        _mixed(parts, correlation),
+        _correlate_columns(parts, correlation),
         together_dof([part.u_dof for part in parts]),
         type="B",
         is_default=any(part.is_default for part in parts),
@@ -267,22 +294,24 @@ def _together(names, sources, pairs):
     )
 
 
-def _mixed(parts, correlation):
-    """(rows, n) columns of parts that are correlated, each a column with its rows in a row."""
+def _correlate_columns(parts, correlation):
+    """Columns (rows, n) of correlated parts, stored by column."""
+    # Columns (c_i u_i) L, computed as L' times the contributions in blocks of rows.
     mix, rows = triangular(correlation).T, len(parts[0].columns_m3)
     columns = np.empty((len(parts), rows))
     for start in range(0, rows, BLOCK):
-        some = slice(start, start + BLOCK)
-        np.matmul(mix, [part.columns_m3[some, 0] for part in parts], out=columns[:, some])
+        block = slice(start, start + BLOCK)
+        np.matmul(mix, [part.columns_m3[block, 0] for part in parts], out=columns[:, block])
     return columns.T
 
 
 def together_dof(dof):
-    """Degrees of freedom of inputs that are correlated with one another: the least of theirs.
+    """Degrees of freedom of correlated inputs: the smallest value among the inputs.
 
     Parameters
     ----------
     dof : array_like, shape (n,)
+        Degrees of freedom of each input; may be inf.
 
     Returns
     -------
@@ -298,19 +327,19 @@ def together_dof(dof):
 
 @dataclass(frozen=True)
 class Combined:
-    """Outputs made of independent components; one row an output.
+    """Combined uncertainty of outputs with independent components; each row is an output.
 
     Attributes
     ----------
     variances : ndarray, shape (rows, components)
-        That each component brings, in the unit of the output squared.
+        Variance contributed by each component, in the unit of the output squared.
     dof : ndarray, shape (components,)
-        Degrees of freedom of each, may be inf.
+        Degrees of freedom of each component; may be inf.
 
     Examples
     --------
-    >>> one = Combined(np.array([[9.0, 16.0]]), np.array([9.0, np.inf]))
-    >>> one.u.tolist(), one.effective_dof.round(2).tolist(), one.k(0.95).round(3).tolist()
+    >>> output = Combined(np.array([[9.0, 16.0]]), np.array([9.0, np.inf]))
+    >>> output.u.tolist(), output.effective_dof.round(2).tolist(), output.k(0.95).round(3).tolist()
     ([5.0], [69.44], [1.995])
     """
 
@@ -319,33 +348,34 @@ class Combined:
 
     @cached_property
     def u(self):
-        """(rows,) combined standard uncertainty."""
+        """Combined standard uncertainty (rows,)."""
         return np.sqrt(np.sum(self.variances, axis=1))
 
     @cached_property
     def effective_dof(self):
-        """(rows,) effective degrees of freedom, Welch-Satterthwaite; inf without finite ones."""
+        """Effective degrees of freedom (rows,), Welch-Satterthwaite; inf if all are infinite."""
+        # Welch-Satterthwaite: u^4 / sum(u_i^4 / dof_i).
         fourths = sum_of_fourths(self.variances, self.dof)
         return dof_of(np.sum(self.variances, axis=1), fourths, least_of(self.dof))
 
     def k(self, probability):
-        """(rows,) coverage factor for that coverage probability, of Student's t."""
+        """Coverage factor (rows,) of Student's t for a coverage probability."""
         return coverage_factor(probability, self.effective_dof)
 
     def expanded(self, probability):
-        """(rows,) expanded uncertainty U = k u."""
+        """Expanded uncertainty (rows,), U = k u."""
         return self.k(probability) * self.u
 
 
 def combine(sources, rows):
-    """Outputs made of independent causes: their u, degrees of freedom, k and U.
+    """Combine independent sources: u, degrees of freedom, k and U of each output.
 
     Parameters
     ----------
     sources : sequence of Source
-        Causes whose columns have one row for each output, in its unit.
+        Sources with a row for each output, in its unit.
     rows : int
-        Outputs.
+        Number of outputs.
 
     Returns
     -------
@@ -353,10 +383,11 @@ def combine(sources, rows):
 
     Examples
     --------
-    >>> found = combine([Source("tape", np.array([[3.0]]), 9.0), Source("form", [[4.0]])], 1)
-    >>> found.u.tolist(), found.expanded(0.95).round(2).tolist()
+    >>> output = combine([Source("tape", np.array([[3.0]]), 9.0), Source("form", [[4.0]])], 1)
+    >>> output.u.tolist(), output.expanded(0.95).round(2).tolist()
     ([5.0], [9.97])
     """
-    squares = [np.einsum("ij,ij->i", one.columns_m3, one.columns_m3) for one in sources]
+    # A source with several columns contributes the sum of their squares.
+    squares = [np.einsum("ij,ij->i", source.columns_m3, source.columns_m3) for source in sources]
     variances = np.reshape(squares, (len(squares), rows)).T
-    return Combined(variances, np.array([one.u_dof for one in sources], dtype=float))
+    return Combined(variances, np.array([source.u_dof for source in sources], dtype=float))

@@ -1,15 +1,17 @@
-"""The named distributions of an input of a measurement, all of them symmetric about their mean.
+"""Distributions of the inputs of a measurement, all symmetric about their mean.
 
-Each has `name`, `mean`, `sd`, `u`, `dof`, `quantile(p)` and `characteristic(t)`; make one of what a
-certificate says with `standard`, `within` or `expanded`.
+Each distribution has `name`, `mean`, `sd`, `u`, `dof`, `quantile(p)` and `characteristic(t)`.
+`standard`, `within` and `expanded` create a distribution from the statement of a certificate.
 
-    u    what the law of propagation uses, with the degrees of freedom `dof` (JCGM 100:2008 G.4)
-    sd   the standard deviation of the distribution, which Monte Carlo draws from
+    u    standard uncertainty for the law of propagation, with degrees of freedom `dof` (JCGM
+    100:2008 G.4)
+    sd   standard deviation of the distribution, used by Monte Carlo
 
-Both are the same but for Student's t of which the scale is declared: its u is s/sqrt(n) of n
-readings, not sqrt(dof/(dof - 2)) times as much, and u itself is unsure by its dof. Of a t that is
-declared by its standard deviation, u is that: dof is its shape only, and u is not unsure, so
-that `u_dof` is infinite. u is what was declared, always.
+u is always the declared value. It equals sd, except for Student's t with a declared scale. The
+scale is s/sqrt(n) for n readings, not sqrt(dof/(dof - 2)) times this value, and u has the degrees
+of freedom `dof`. For Student's t with a declared standard deviation, `dof` is only the shape. u is
+then not an estimate, and `u_dof` is infinite.
+
 Source: JCGM 100:2008 4.2, 4.3, G.3, G.4; JCGM 101:2008 6.4.
 """
 
@@ -32,13 +34,15 @@ from tankcal.gum.inputs import Input
 
 @dataclass(frozen=True)
 class Distribution:
-    """What all have: mean (unit of the input) and quantiles from those of the centred half.
+    """Base class: mean, and quantiles from the distance of a quantile from the mean.
 
     Attributes
     ----------
+    mean : float
+        Mean, in the unit of the input.
     dof : float
-        Degrees of freedom of u in the law of propagation; how unsure u itself is (G.3). It changes
-        no quantile, except Student's t, whose shape it is.
+        Degrees of freedom of u in the law of propagation, a measure of the uncertainty of u itself
+        (G.3). They affect the quantiles of Student's t only, as its shape.
     """
 
     mean: float = field(default=0.0, kw_only=True)
@@ -47,12 +51,12 @@ class Distribution:
     def __post_init__(self):
         if not self.dof > 0:
             raise ValueError(f"degrees of freedom {self.dof}: expected a number above 0, or inf")
-        for one in fields(self):
-            value = getattr(self, one.name)
-            if one.name != "dof" and not np.isfinite(value):
-                raise ValueError(f"{one.name} {value}: expected a finite number")
-            if one.name not in ("dof", "mean") and value < 0:
-                raise ValueError(f"{one.name} {value}: expected 0 or more")
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if item.name != "dof" and not np.isfinite(value):
+                raise ValueError(f"{item.name} {value}: expected a finite number")
+            if item.name not in ("dof", "mean") and value < 0:
+                raise ValueError(f"{item.name} {value}: expected 0 or more")
 
     @property
     def u(self):
@@ -61,32 +65,56 @@ class Distribution:
 
     @property
     def u_dof(self):
-        """Degrees of freedom of u in the formula of Welch-Satterthwaite."""
+        """Degrees of freedom of u in the Welch-Satterthwaite formula."""
         return self.dof
 
     def quantile(self, p):
-        """Values below which the input lies with probability p, of any shape, each in [0, 1].
+        """Values with probability p below them.
 
-        Raises ValueError for a p outside of it.
+        Parameters
+        ----------
+        p : array_like, shape (...,)
+            Probabilities in [0, 1].
+
+        Returns
+        -------
+        ndarray, shape (...,)
+            In the unit of the input.
+
+        Raises
+        ------
+        ValueError
+            For a probability outside [0, 1].
         """
         p = np.asarray(p, dtype=float)
         if not np.all((p >= 0) & (p <= 1)):
             raise ValueError("a probability is outside 0 to 1")
         if not self._width:
             return np.full(p.shape, self.mean)[()]
+        # By symmetry, the smaller tail determines the distance; it is more precise near p = 1.
         distance = self._distance(np.minimum(p, 1 - p))
         return (self.mean + np.where(p < 0.5, -distance, distance))[()]
 
     def characteristic(self, t):
-        """E cos(t (X - mean)), of any shape of t: the characteristic function of X - mean."""
+        """Characteristic function of X - mean, E cos(t (X - mean)).
+
+        Parameters
+        ----------
+        t : array_like, shape (...,)
+            Argument, in the inverse unit of the input.
+
+        Returns
+        -------
+        ndarray, shape (...,)
+        """
         t = np.abs(np.asarray(t, dtype=float)) * self._width
-        near = t < 1e-9  # there it is 1 - (t sd)^2/2, equal to 1
-        return np.where(near, 1.0, self._transform(np.where(near, 1.0, t)))[()]
+        is_small = t < 1e-9  # phi = 1 - (t sd)^2/2 rounds to 1
+        return np.where(is_small, 1.0, self._transform(np.where(is_small, 1.0, t)))[()]
 
 
 @dataclass(frozen=True)
 class Normal(Distribution):
-    """Gaussian (JCGM 101 6.4.7).
+    """Normal distribution (JCGM 101 6.4.7).
 
     Attributes
     ----------
@@ -116,12 +144,15 @@ class Normal(Distribution):
 
 @dataclass(frozen=True)
 class StudentT(Distribution):
-    """Scaled and shifted t with `dof` degrees of freedom, finite (JCGM 101 6.4.9).
+    """Scaled and shifted t distribution with finite `dof` (JCGM 101 6.4.9).
 
     Attributes
     ----------
+    scale : float
+        Scale, in the unit of the input.
     by_sd : bool
-        Declared by its standard deviation: that is u then, and dof is the shape alone.
+        True if the standard deviation was declared. u is then the standard deviation, and `dof` is
+        only the shape.
     """
 
     name = "t"
@@ -136,17 +167,17 @@ class StudentT(Distribution):
 
     @property
     def u(self):
-        """The scale, as JCGM 100 4.2.3 has it; the standard deviation where that was declared."""
+        """Scale (JCGM 100 4.2.3), or the standard deviation if it was declared."""
         return self.sd if self.by_sd else self.scale
 
     @property
     def u_dof(self):
-        """The dof; inf of a declared standard deviation, which is not an estimate."""
+        """Degrees of freedom; inf for a declared standard deviation, which is no estimate."""
         return np.inf if self.by_sd else self.dof
 
     @property
     def sd(self):
-        """scale sqrt(dof/(dof - 2)); inf for two degrees of freedom or fewer."""
+        """Standard deviation, scale sqrt(dof/(dof - 2)); inf for at most two degrees of freedom."""
         if self.dof <= 2:
             return np.inf if self.scale else 0.0
         return self.scale * np.sqrt(self.dof / (self.dof - 2))
@@ -156,25 +187,28 @@ class StudentT(Distribution):
         return self.scale
 
     def _distance(self, tail):
+        # student_quantile is negative for the lower tail.
         return -self.scale * student_quantile(tail, self.dof)
 
     def _transform(self, t):
         half, root = self.dof / 2, np.sqrt(self.dof) * t
-        if half > 25:  # where Bessel's function leaves the range of numbers
-            return _bessel_of_large_order(half, root)
+        if half > 25:  # K_half overflows
+            return _scaled_bessel(half, root)
+        # phi(t) = (sqrt(dof) t)^half K_half(sqrt(dof) t) / (Gamma(half) 2^(half - 1)), with
+        # logarithms to avoid overflow; kve contains exp(root).
         power = half * np.log(root / 2) - root - gammaln(half)
         return 2 * np.exp(power) * kve(half, root)
 
 
 @dataclass(frozen=True)
 class _Bounded(Distribution):
-    """Within mean +- half_width; sd is half_width / ratio."""
+    """Distribution within mean +- half_width; sd is half_width / sqrt(squared_ratio)."""
 
     half_width: float
 
     @property
     def sd(self):
-        """Standard deviation, half_width over the square root of the family's ratio."""
+        """Standard deviation, half_width / sqrt(squared_ratio)."""
         return self.half_width / np.sqrt(self.squared_ratio)
 
     @property
@@ -184,7 +218,7 @@ class _Bounded(Distribution):
 
 @dataclass(frozen=True)
 class Rectangular(_Bounded):
-    """Anywhere within mean +- half_width, equally likely (JCGM 101 6.4.2).
+    """Rectangular distribution within mean +- half_width (JCGM 101 6.4.2).
 
     Attributes
     ----------
@@ -202,6 +236,7 @@ class Rectangular(_Bounded):
     squared_ratio = 3.0
 
     def _distance(self, tail):
+        # Linear distribution function: tail = (1 - distance/a)/2.
         return self.half_width * (1 - 2 * tail)
 
     def _transform(self, t):
@@ -210,7 +245,7 @@ class Rectangular(_Bounded):
 
 @dataclass(frozen=True)
 class Triangular(_Bounded):
-    """Within mean +- half_width, most likely the mean (JCGM 101 6.4.5).
+    """Triangular distribution within mean +- half_width (JCGM 101 6.4.5).
 
     Attributes
     ----------
@@ -228,15 +263,19 @@ class Triangular(_Bounded):
     squared_ratio = 6.0
 
     def _distance(self, tail):
+        # tail = (1 - distance/a)^2/2.
         return self.half_width * (1 - np.sqrt(2 * tail))
 
     def _transform(self, t):
+        # Sum of two rectangular distributions of half the width.
         return (np.sin(t / 2) / (t / 2)) ** 2
 
 
 @dataclass(frozen=True)
 class UShaped(_Bounded):
-    """Arc sine: a sine of unknown phase, mean +- half_width (JCGM 101 6.4.6).
+    """U-shaped (arc sine) distribution within mean +- half_width (JCGM 101 6.4.6).
+
+    It is the distribution of a sine with unknown phase.
 
     Attributes
     ----------
@@ -254,22 +293,24 @@ class UShaped(_Bounded):
     squared_ratio = 2.0
 
     def _distance(self, tail):
+        # Projection of a uniform phase.
         return self.half_width * np.cos(np.pi * tail)
 
     def _transform(self, t):
+        # Bessel function of order 0 (integral over the phase).
         return j0(t)
 
 
 @dataclass(frozen=True)
 class CurvilinearTrapezoid(Distribution):
-    """Rectangular whose half-width w is itself known only to +- d (JCGM 101 6.4.3).
+    """Rectangular distribution with an inexact half-width w +- d (JCGM 101 6.4.3).
 
-    sd = sqrt(w^2/3 + d^2/9);  density ln((w + d)/max(|x|, w - d))/(4 d) within |x| < w + d
+        sd = sqrt(w^2/3 + d^2/9);  density ln((w + d)/max(|x|, w - d))/(4 d) within |x| < w + d
 
     Attributes
     ----------
     middle_half_width : float
-        w, (b - a)/2 there.
+        w, (b - a)/2 in JCGM 101.
     inexactness : float
         d, above 0 and below w.
     """
@@ -289,17 +330,17 @@ class CurvilinearTrapezoid(Distribution):
 
     @property
     def sd(self):
-        """Standard deviation, with the inexactness of the limits in it."""
+        """Standard deviation, including the inexactness of the limits."""
         return np.sqrt(self.middle_half_width**2 / 3 + self.inexactness**2 / 9)
 
     @property
     def half_width(self):
-        """w + d, the outermost limit."""
+        """Outermost limit, w + d."""
         return self.middle_half_width + self.inexactness
 
     @property
     def _relative(self):
-        """(inner limit, d), both by the outermost limit."""
+        """Inner limit and d, both divided by the outermost limit."""
         relative = self.inexactness / self.half_width
         return 1 - 2 * relative, relative
 
@@ -309,13 +350,15 @@ class CurvilinearTrapezoid(Distribution):
 
     def _distance(self, tail):
         inner, relative = self._relative
+        # Within the inner limit, the density is constant.
         plateau = -np.log1p(-2 * relative)
         flat = (0.5 - tail) * 4 * relative / plateau
-        # beyond the inner limit tail = P(2, y)/(4 relative) with |x| = outermost exp(-y)
-        within = np.minimum(4 * relative * tail, gammainc(2, plateau))
-        return self.half_width * np.where(flat < inner, flat, np.exp(-gammaincinv(2, within)))
+        # Beyond the inner limit: tail = P(2, y)/(4 relative), with |x| = outermost exp(-y).
+        tail_area = np.minimum(4 * relative * tail, gammainc(2, plateau))
+        return self.half_width * np.where(flat < inner, flat, np.exp(-gammaincinv(2, tail_area)))
 
     def _transform(self, t):
+        # The sine integral is the transform of the logarithmic density.
         inner, relative = self._relative
         return (sici(t)[0] - sici(inner * t)[0]) / (2 * relative * t)
 
@@ -325,20 +368,35 @@ NAMES = ("normal", *FAMILIES, "t", "curvilinear trapezoid")
 
 
 def standard(u, name="normal", *, dof=np.inf, mean=0.0, u_is="scale"):
-    """The distribution called `name` of standard uncertainty u, the unit of the input.
+    """Distribution with a given name and standard uncertainty.
 
     Parameters
     ----------
-    name : optional
-        One of normal, rectangular, triangular, u-shaped, t. A normal with finite degrees of freedom
-        is Student's t (JCGM 101 6.4.9.7): u was estimated from the readings.
-    u_is : optional
-        What u is of Student's t: its "scale", or its "sd" (more than two degrees of freedom).
+    u : float
+        Standard uncertainty, in the unit of the input.
+    name : str, optional
+        normal, rectangular, triangular, u-shaped or t. A normal distribution with finite degrees of
+        freedom becomes Student's t (JCGM 101 6.4.9.7), because u was estimated from readings.
+    dof : float, optional
+        Degrees of freedom of u.
+    mean : float, optional
+        Estimate of the input.
+    u_is : str, optional
+        Meaning of u for Student's t: "scale", or "sd" (more than two degrees of freedom).
+
+    Returns
+    -------
+    Distribution
 
     Raises
     ------
     ValueError
-        For another name, a negative or non-finite u, dof not above 0.
+        For an unknown name, a negative or non-finite u, or dof not above 0.
+
+    Examples
+    --------
+    >>> standard(0.5, "rectangular").half_width.round(4)
+    np.float64(0.866)
     """
     if u_is not in ("scale", "sd"):
         raise ValueError(f"u is its {u_is!r}: expected 'scale' or 'sd'")
@@ -352,23 +410,41 @@ def standard(u, name="normal", *, dof=np.inf, mean=0.0, u_is="scale"):
     if u_is == "sd" and not dof > 2:
         raise ValueError(f"Student's t with {dof} degrees of freedom has no standard deviation")
     if u_is == "sd":
+        # scale = sd sqrt((dof - 2)/dof).
         return StudentT(u * np.sqrt(1 - 2 / dof), mean=mean, dof=dof, by_sd=True)
     return StudentT(u, mean=mean, dof=dof)
 
 
 def within(half_width, name="rectangular", *, mean=0.0, dof=np.inf, inexactness=0.0):
-    """The distribution called `name` between mean - half_width and mean + half_width.
+    """Distribution between mean - half_width and mean + half_width.
 
     Parameters
     ----------
-    inexactness : optional
-        Of a rectangular one: the half-width itself is known to +- this much only, which Monte Carlo
-        sees; dof say the same to the law of propagation (JCGM 100 G.4.2).
+    half_width : float
+        Half-width, in the unit of the input.
+    name : str, optional
+        rectangular, triangular or u-shaped.
+    mean : float, optional
+        Estimate of the input.
+    dof : float, optional
+        Degrees of freedom of u.
+    inexactness : float, optional
+        Largest error of the half-width of a rectangular distribution, which only Monte Carlo
+        considers. For the law of propagation, `dof` has the equivalent meaning (JCGM 100 G.4.2).
+
+    Returns
+    -------
+    Distribution
 
     Raises
     ------
     ValueError
-        For a name without limits, a negative or non-finite half-width.
+        For a name without limits, or a negative or non-finite half-width.
+
+    Examples
+    --------
+    >>> round(float(within(0.3).u), 4)
+    0.1732
     """
     if name not in FAMILIES:
         raise ValueError(f"distribution {name!r} has no limits: expected {', '.join(FAMILIES)}")
@@ -380,21 +456,34 @@ def within(half_width, name="rectangular", *, mean=0.0, dof=np.inf, inexactness=
 
 
 def expanded(U, *, k=None, probability=None, dof=np.inf, mean=0.0):
-    """The distribution behind an expanded uncertainty U: u = U/k (JCGM 100 4.3.3).
+    """Distribution behind an expanded uncertainty U, with u = U/k (JCGM 100 4.3.3).
 
     Parameters
     ----------
-    k : optional
-        The coverage factor that the certificate states, or.
-    probability : optional
-        Its coverage probability: k of Student's t (JCGM 101 6.4.9.7).
-    dof : optional
-        Degrees of freedom that the certificate states; infinite gives a normal.
+    U : float
+        Expanded uncertainty, in the unit of the input.
+    k : float, optional
+        Coverage factor stated by the certificate.
+    probability : float, optional
+        Coverage probability, instead of k; k then follows from Student's t (JCGM 101 6.4.9.7).
+    dof : float, optional
+        Degrees of freedom stated by the certificate; infinite for a normal distribution.
+    mean : float, optional
+        Estimate of the input.
+
+    Returns
+    -------
+    Distribution
 
     Raises
     ------
     ValueError
-        Unless exactly one of k and probability is given, k above 0.
+        Unless exactly one of k and probability is given, with k above 0.
+
+    Examples
+    --------
+    >>> expanded(0.2, k=2.0).u
+    0.1
     """
     if (k is None) == (probability is None):
         raise ValueError("an expanded uncertainty needs its k or its coverage probability")
@@ -404,16 +493,31 @@ def expanded(U, *, k=None, probability=None, dof=np.inf, mean=0.0):
         k = float(coverage_factor(probability, dof))
     if not 0 < k < np.inf:
         raise ValueError(f"coverage factor {k}: expected above 0")
+    # JCGM 100 4.3.3: the standard uncertainty is U/k.
     return standard(U / k, dof=dof, mean=mean)
 
 
 def vector(name, estimates, u, unit="", *, dof=np.inf, type="A", note=""):
-    """Inputs "name 1", "name 2", ... of one family: coordinates of points, say.
+    """Inputs "name 1", "name 2", ... of one family, such as the coordinates of points.
 
     Parameters
     ----------
-    estimates, u : ndarray, shape (p,)
-        In `unit`, normal, or t when dof is finite.
+    name : str
+        Name of the family.
+    estimates, u : array_like, shape (p,)
+        Estimates and standard uncertainties in `unit`; normal, or t for finite dof.
+    unit : str, optional
+        Unit.
+    dof : float, optional
+        Degrees of freedom of each u.
+    type : str, optional
+        Type of evaluation, "A" or "B".
+    note : str, optional
+        Note for the budget.
+
+    Returns
+    -------
+    list of Input
     """
     pairs = enumerate(zip(estimates, u, strict=True), 1)
     return [
@@ -422,16 +526,22 @@ def vector(name, estimates, u, unit="", *, dof=np.inf, type="A", note=""):
     ]
 
 
-def _bessel_of_large_order(order, x):
-    """2 (x/2)^order K_order(x) / Gamma(order), Debye's expansion (DLMF 10.41.4), 1 at x = 0."""
+def _scaled_bessel(order, x):
+    """2 (x/2)^order K_order(x) / Gamma(order) by Debye's expansion; 1 at x = 0.
+
+    Source: DLMF 10.41.4.
+    """
     squared = (x / order) ** 2
     s = np.sqrt(1 + squared)
-    excess = squared / (1 + s)  # s - 1
+    # s - 1 without cancellation.
+    excess = squared / (1 + s)
     power = order * (np.log1p(excess / 2) - excess) - np.log(s) / 2
+    # The quotient of the two expansions replaces the Gamma function.
     return np.exp(power) * _debye(order, 1 / s) / _debye(order, 1.0)
 
 
 def _debye(order, p):
+    """Debye's expansion in 1/order, up to the third term."""
     first = p * (3 - 5 * p**2) / 24
     second = p**2 * (81 - 462 * p**2 + 385 * p**4) / 1152
     third = p**3 * (30375 - 369603 * p**2 + 765765 * p**4 - 425425 * p**6) / 414720

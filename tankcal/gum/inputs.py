@@ -1,7 +1,8 @@
-"""The inputs of a measurement, each once, and how they vary together (JCGM 100:2008 5.2, F.1.2).
+"""Inputs of a measurement and their correlations (JCGM 100:2008 5.2, F.1.2).
 
-An input that enters a model twice (one tape for diameter and height) is ONE input with one name;
-a correlation is for estimates that were found together, such as coordinates of one adjustment.
+A quantity that enters a model twice (one tape for diameter and height) is a single input with one
+name. A correlation describes estimates from a joint evaluation, such as coordinates of one
+adjustment.
 """
 
 from dataclasses import dataclass
@@ -12,32 +13,35 @@ from scipy.sparse import csr_array
 
 from tankcal.gum.components import factor_of
 
-_ROUNDING = 1e-9  # of a correlation: what two programs may differ by
+_ROUNDING = 1e-9  # correlation coefficients of different programs may differ by this amount
 
 
 @dataclass(frozen=True)
 class Input:
-    """One quantity that the model asks for.
+    """Input quantity of a model.
 
     Attributes
     ----------
     name : str
+        Name of the input.
     distribution : object
-        Of its value, with `mean`, `u`, `u_dof` and `name` as those of `gum.distributions`; its mean
-        is the estimate, in `unit`.
+        Distribution with `mean`, `u`, `u_dof` and `name`, as in `gum.distributions`. Its mean is
+        the estimate, in `unit`.
     unit : str
+        Unit.
     type : str
-        "A" of readings, "B" of other knowledge.
+        Type of evaluation: "A" from readings, "B" from other information.
     family : str
-        Name of the line of the budget that it is part of; "" for a line of its own.
+        Name of the common line in the budget; "" for a separate line.
     is_default : bool
-        True when nobody declared it: the program's own assumption.
+        True for an assumption of the program, which nobody declared.
     note : str
+        Note for the budget.
 
     Raises
     ------
     ValueError
-        For another type than "A" or "B".
+        For a type other than "A" or "B".
     """
 
     name: str
@@ -54,25 +58,25 @@ class Input:
 
     @property
     def line(self):
-        """The line of the budget that it is part of."""
+        """Name of the line in the budget that contains the input."""
         return self.family or self.name
 
 
 class Inputs:
-    """Inputs in the order in which the model takes them, with their correlations.
+    """Inputs in the order of the arguments of the model, with their correlations.
 
     Parameters
     ----------
     inputs : sequence of Input, length n
-        Their names all different.
+        Inputs with distinct names.
     correlation : dict of {(str, str): float}, or ndarray of shape (n, n), optional
-        r of the pairs that are correlated, or the whole matrix.
+        Correlation coefficients of correlated pairs, or the whole matrix.
 
     Raises
     ------
     ValueError
-        For names twice or unknown, |r| > 1, a matrix that is not symmetric, has no ones in its
-        diagonal, or has a negative eigenvalue (named with its size).
+        For repeated or unknown names, |r| > 1, or a matrix that is not a correlation matrix. A
+        correlation matrix is symmetric, has a unit diagonal and no negative eigenvalue.
 
     Examples
     --------
@@ -84,64 +88,78 @@ class Inputs:
 
     def __init__(self, inputs, correlation=None):
         self.inputs = tuple(inputs)
-        self.names = tuple(one.name for one in self.inputs)
+        self.names = tuple(item.name for item in self.inputs)
         twice = sorted({name for name in self.names if self.names.count(name) > 1})
         if twice:
             raise ValueError(f"input given twice: {', '.join(twice)}; a shared input is one input")
+        # Without correlations, the matrix is the identity.
         pairs = {} if correlation is None else correlation
-        matrix = self._of_pairs(pairs) if isinstance(pairs, dict) else np.array(pairs, dtype=float)
-        self.correlation = _checked(matrix, self.names)
-        self.estimates = np.array([one.distribution.mean for one in self.inputs])
-        self.u = np.array([one.distribution.u for one in self.inputs])
-        self.dof = np.array([one.distribution.u_dof for one in self.inputs])
+        matrix = (
+            self._build_correlation(pairs)
+            if isinstance(pairs, dict)
+            else np.array(pairs, dtype=float)
+        )
+        self.correlation = _check_correlation(matrix, self.names)
+        self.estimates = np.array([item.distribution.mean for item in self.inputs])
+        self.u = np.array([item.distribution.u for item in self.inputs])
+        self.dof = np.array([item.distribution.u_dof for item in self.inputs])
 
     def __len__(self):
         return len(self.inputs)
 
     def index(self, name):
-        """Place of the input called `name`; raises ValueError when there is none."""
+        """Index of the input with this name.
+
+        Raises
+        ------
+        ValueError
+            For an unknown name.
+        """
         if name not in self.names:
             raise ValueError(f"no input is called {name!r}: there are {', '.join(self.names)}")
         return self.names.index(name)
 
     @property
     def covariance(self):
-        """(n, n) covariance of the inputs, u u' times the correlations."""
+        """Covariance (n, n) of the inputs."""
         return self.correlation * np.outer(self.u, self.u)
 
     @cached_property
     def groups(self):
-        """Places of the inputs that are correlated with one another, one array a group."""
-        from scipy.sparse.csgraph import connected_components  # loads the solvers, too
+        """Indices of the inputs in each group of correlated inputs, one array for each group."""
+        from scipy.sparse.csgraph import connected_components  # slow to load
 
+        # Inputs correlated through other inputs belong to the same group.
         count, label = connected_components(csr_array(self.correlation != 0), directed=False)
         return tuple(np.flatnonzero(label == i) for i in range(count))
 
     @cached_property
     def blocks(self):
-        """For each group (p, c) factor of its covariance, c its rank: covariance = factor factor'.
+        """Factor (p, c) of the covariance of each group: covariance = factor factor', c its rank.
 
-        The groups stand by themselves, so no matrix of all inputs is decomposed.
+        The groups are independent, so that no matrix of all inputs is decomposed.
         """
         return tuple(
+            # covariance = diag(u) R diag(u).
             self.u[group, None] * factor_of(self.correlation[np.ix_(group, group)])
             if len(group) > 1
             else self.u[group, None]
             for group in self.groups
         )
 
-    def _of_pairs(self, pairs):
+    def _build_correlation(self, pairs):
+        """Correlation matrix from a dictionary of pairs."""
         matrix = np.eye(len(self))
-        for (one, other), r in pairs.items():
-            i, j = self.index(one), self.index(other)
+        for (first, second), r in pairs.items():
+            i, j = self.index(first), self.index(second)
             if i == j or matrix[i, j]:
-                raise ValueError(f"the correlation of {one} and {other} is given twice")
+                raise ValueError(f"the correlation of {first} and {second} is given twice")
             matrix[i, j] = matrix[j, i] = r
         return matrix
 
 
-def _checked(matrix, names):
-    """The correlation matrix made exactly symmetric; raises ValueError as `Inputs` says."""
+def _check_correlation(matrix, names):
+    """Check a correlation matrix and make it exactly symmetric; raises ValueError, see `Inputs`."""
     if matrix.shape != (len(names), len(names)):
         raise ValueError(f"correlations {matrix.shape} of {len(names)} inputs")
     if not np.all(np.isfinite(matrix)):
@@ -153,7 +171,9 @@ def _checked(matrix, names):
     if np.abs(matrix).max(initial=0) > 1 + _ROUNDING:
         i, j = np.unravel_index(np.abs(matrix).argmax(), matrix.shape)
         raise ValueError(f"correlation {matrix[i, j]:g} of {names[i]} and {names[j]}: beyond 1")
+    # A negative eigenvalue would give a combination of inputs a negative variance.
     smallest = np.linalg.eigvalsh(matrix)[0] if len(names) else 1.0
+    # Rounding of the coefficients adds up over the inputs.
     if smallest < -_ROUNDING * len(names):
         raise ValueError(f"the correlations contradict one another: eigenvalue {smallest:.3g}")
     return (matrix + matrix.T) / 2

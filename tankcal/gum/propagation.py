@@ -1,10 +1,10 @@
-"""The law of propagation for several outputs, with few columns: U_y = (J L)(J L)'.
+"""Law of propagation for several outputs, with few columns: U_y = (J L)(J L)'.
 
     y = f(x),  J = dy/dx (rows x inputs),  U_x = L L'  (JCGM 100:2008 5.2.2, JCGM 102:2011 6.2)
 
-Nothing of rows x rows is formed unless `covariance` is asked for.
+No matrix rows x rows is computed, except by `covariance`.
 
-Inputs that are correlated are one `Source`, and one component of u (`components.together_dof`).
+Correlated inputs form one `Source`, and one component of u (`components.together_dof`).
 """
 
 from dataclasses import dataclass
@@ -19,16 +19,16 @@ from tankcal.gum.sensitivities import check_sensitivities, outputs_of, sensitivi
 
 @dataclass(frozen=True)
 class Propagation:
-    """Outputs with their uncertainty; one row an output.
+    """Outputs with their uncertainty; each row is an output.
 
     Attributes
     ----------
     inputs : Inputs
-        What went in, n of them.
+        The n inputs.
     values : ndarray, shape (rows,)
         Outputs at the estimates, in the unit of the output.
     sensitivities : ndarray, shape (rows, n)
-        J, unit of the output by unit of the input.
+        Sensitivity coefficients J, unit of the output per unit of the input.
     """
 
     inputs: Inputs
@@ -50,90 +50,103 @@ class Propagation:
 
     @cached_property
     def combination(self):
-        """`Combined` of the sources."""
+        """Combined uncertainty of the sources."""
         return combine(self.sources, len(self.values))
 
     @property
     def factor(self):
-        """(rows, c) J L: the covariance of the outputs is factor factor'."""
+        """Factor J L (rows, c); the covariance of the outputs is factor factor'."""
+        # The empty column serves a propagation without sources.
         columns = [source.columns_m3 for source in self.sources]
         return np.hstack([np.empty((len(self.values), 0)), *columns])
 
     @property
     def u(self):
-        """(rows,) combined standard uncertainty."""
+        """Combined standard uncertainty (rows,)."""
         return self.combination.u
 
     @property
     def covariance(self):
-        """(rows, rows) covariance of the outputs; for a few rows."""
+        """Covariance (rows, rows) of the outputs; for few rows only."""
         factor = self.factor
         return factor @ factor.T
 
     @property
     def correlation(self):
-        """(rows, rows) correlation of the outputs, 0 for an output without uncertainty."""
+        """Correlation (rows, rows) of the outputs; 0 for an output without uncertainty."""
         u = self.u
         inverse = np.divide(1, u, out=np.zeros_like(u), where=u > 0)
+        # Rounding may exceed 1.
         return np.clip(self.covariance * np.outer(inverse, inverse), -1, 1)
 
     @property
     def dof(self):
-        """(rows,) effective degrees of freedom; inf where only such inputs contribute."""
+        """Effective degrees of freedom (rows,); inf if all contributing inputs have inf."""
         return self.combination.effective_dof
 
     def k(self, probability):
-        """(rows,) coverage factor for that coverage probability, of Student's t."""
+        """Coverage factor (rows,) of Student's t for a coverage probability."""
         return self.combination.k(probability)
 
     def expanded(self, probability):
-        """(rows,) expanded uncertainty U = k u."""
+        """Expanded uncertainty (rows,), U = k u."""
         return self.combination.expanded(probability)
 
     def shares(self):
-        """(rows, n) part of the variance that each input brings, its covariances halved.
+        """Share (rows, n) of each input in the variance, with half of each covariance.
 
-        c_i u_i sum_j r_ij c_j u_j / u^2: they add up to 1, and can be negative where inputs are
-        correlated; 0 in a row without uncertainty.
+        The shares c_i u_i sum_j r_ij c_j u_j / u^2 have the sum 1. A share can be negative for
+        correlated inputs. A row without uncertainty has zero shares.
         """
         parts = np.empty_like(self.sensitivities)
-        of_groups = zip(self.inputs.groups, self.inputs.blocks, self.sources, strict=True)
-        for group, block, source in of_groups:
+        groups = zip(self.inputs.groups, self.inputs.blocks, self.sources, strict=True)
+        for group, block, source in groups:
+            # c_i u_i sum_j r_ij c_j u_j = c_i (L (L'c'))_i, with the columns J L of the source.
             parts[:, group] = self.sensitivities[:, group] * (source.columns_m3 @ block.T)
         variance = np.sum(self.combination.variances, axis=1, keepdims=True)
         return np.divide(parts, variance, out=np.zeros_like(parts), where=variance > 0)
 
     def combine(self, weights):
-        """The propagation of weights @ outputs, (new rows, rows): sums, differences, deliveries.
+        """Propagation of linear combinations of the outputs: sums, differences, deliveries.
 
-        What the outputs have in common cancels or adds up as it must.
+        Common errors of the outputs cancel or add up correctly.
+
+        Parameters
+        ----------
+        weights : array_like, shape (new rows, rows)
+            Coefficients of the outputs.
+
+        Returns
+        -------
+        Propagation
         """
         weights = np.atleast_2d(weights)
         return Propagation(self.inputs, weights @ self.values, weights @ self.sensitivities)
 
     def rows(self, chosen):
-        """The propagation of the chosen rows alone, an index or mask of them."""
+        """Propagation of selected rows, given by indices or by a mask."""
         return Propagation(self.inputs, self.values[chosen], self.sensitivities[chosen])
 
     def scaled(self, name, factor):
-        """The same with u of every input of the budget line `name` times `factor`."""
-        of_line = [one.line == name for one in self.inputs.inputs]
-        by_input = np.where(of_line, factor, 1.0)
-        return Propagation(self.inputs, self.values, self.sensitivities * by_input)
+        """Propagation with u of all inputs of the budget line `name` multiplied by `factor`."""
+        in_line = [item.line == name for item in self.inputs.inputs]
+        # Scaling the sensitivity has the effect of scaling u.
+        factors = np.where(in_line, factor, 1.0)
+        return Propagation(self.inputs, self.values, self.sensitivities * factors)
 
 
 def propagate(model, inputs, sensitivities=None):
-    """Outputs of `model` at the estimates with their uncertainty, u^2 = J U_x J'.
+    """Propagate uncertainty through a model at the estimates of its inputs, u^2 = J U_x J'.
 
     Parameters
     ----------
     model : callable
-        Takes the (n,) inputs in the order of `inputs`, gives a number or (rows,) outputs.
+        model(x) -> a number or outputs (rows,), for inputs x (n,) in the order of `inputs`.
     inputs : Inputs
-        Each quantity once, with its distribution and correlations.
-    sensitivities : (rows, n) array or callable, optional
-        dy/dx, or a function of the (n,) inputs that gives it; found by complex step or differences
-        where nothing is given. A function is held against differences, an array is not.
+        Inputs with distributions and correlations.
+    sensitivities : ndarray, shape (rows, n), or callable, optional
+        dy/dx, or a function of the inputs (n,) that returns it. By default, dy/dx is computed by
+        complex step or by differences. A function is checked against differences, an array is not.
 
     Returns
     -------
@@ -142,10 +155,10 @@ def propagate(model, inputs, sensitivities=None):
     Raises
     ------
     SolutionError
-        When an output is not finite, the model has a kink or a jump at the estimates, or a
+        If an output is not finite, if the model has a kink or a jump at the estimates, or if a
         sensitivity is wrong.
     ValueError
-        For shapes that do not fit.
+        For arrays of the wrong shape.
 
     Examples
     --------
@@ -159,16 +172,17 @@ def propagate(model, inputs, sensitivities=None):
     if not len(inputs):
         raise ValueError("a measurement without inputs has no uncertainty to propagate")
     x, u, names = inputs.estimates, inputs.u, inputs.names
+    # The estimates of the outputs, JCGM 100 4.1.4.
     values = outputs_of(model, x)
     if sensitivities is None:
-        found = sensitivities_of(model, x, u, names)
+        jacobian = sensitivities_of(model, x, u, names)
     elif callable(sensitivities):
-        found = np.atleast_2d(np.asarray(sensitivities(x), dtype=float))
-        check_sensitivities(model, x, u, found, names)
+        jacobian = np.atleast_2d(np.asarray(sensitivities(x), dtype=float))
+        check_sensitivities(model, x, u, jacobian, names)
     else:
-        found = np.atleast_2d(np.asarray(sensitivities, dtype=float))
-    if found.shape != (len(values), len(inputs)):
-        raise ValueError(f"sensitivities {found.shape}, expected {(len(values), len(inputs))}")
-    if not np.all(np.isfinite(found)):
+        jacobian = np.atleast_2d(np.asarray(sensitivities, dtype=float))
+    if jacobian.shape != (len(values), len(inputs)):
+        raise ValueError(f"sensitivities {jacobian.shape}, expected {(len(values), len(inputs))}")
+    if not np.all(np.isfinite(jacobian)):
         raise ValueError("a sensitivity is not a finite number")
-    return Propagation(inputs, values, found)
+    return Propagation(inputs, values, jacobian)

@@ -1,10 +1,13 @@
-"""Sensitivities of a model, dy/dx, where nobody derived them, and a check where somebody did.
+"""Sensitivity coefficients dy/dx of a model by numerical differentiation, and their check.
 
-Complex step: Im f(x + i h)/h, without cancellation, for models that are analytic. It is believed
-only where it agrees with central differences over u(x)/4 and u(x)/8, extrapolated to a step of
-zero (Richardson), over an eighth and a 64th of these steps where the first disagree; else the
-differences are taken. A kink or a jump at the estimate is refused. One beside it, or a curve that
-is strong within u, is not: that the law of propagation does not hold there shows in Monte Carlo.
+The complex step Im f(x + i h)/h has no cancellation, but requires an analytic model. Its result is
+used only if it agrees with central differences. The differences use the steps u(x)/4 and u(x)/8,
+extrapolated to a step of zero (Richardson). If both steps disagree, an eighth and a 64th of these
+steps are tried. Without agreement of the complex step, the differences are the result.
+
+A kink or a jump at the estimate is rejected. A kink beside the estimate, or a strong curvature
+within u, is accepted; Monte Carlo shows whether the law of propagation is valid.
+
 Source: JCGM 100:2008 5.1.3; Squire & Trapp 1998, SIAM Review 40, 110.
 """
 
@@ -15,17 +18,26 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 
-_COMPLEX_STEP = 1e-30
-_AGREEMENT = 1e-3  # of u of the output, and of a sensitivity: the digits of a budget
-_ROUNDING = 64 * np.finfo(float).eps
-_SHARES = (1.0, 1 / 8, 1 / 64)
+_COMPLEX_STEP = 1e-30  # without cancellation, the step can be arbitrarily small
+_AGREEMENT = 1e-3  # relative to u of the output, and to a sensitivity: the digits of a budget
+_ROUNDING = 64 * np.finfo(float).eps  # relative rounding error of an output
+_SHARES = (1.0, 1 / 8, 1 / 64)  # of the first step, tried in this order
 
 
 @dataclass(frozen=True)
 class _Differences:
-    """(rows, n) extrapolated differences, by how much they may be wrong, and which are sound.
+    """Extrapolated differences (rows, n).
 
-    reach  how far the first steps say that an output moves within u, whatever its slope is
+    Attributes
+    ----------
+    slopes : ndarray
+        Derivatives.
+    doubt : ndarray
+        Largest error of each derivative.
+    sound : ndarray of bool
+        True for a derivative with agreeing steps and without a kink.
+    reach : ndarray
+        Change of the output within u according to the first steps, whatever its slope.
     """
 
     slopes: np.ndarray
@@ -40,11 +52,12 @@ def sensitivities_of(model, x, u, names=None):
     Parameters
     ----------
     model : callable
-        Takes (n,) estimates, gives a number or (rows,); a complex x too if it can.
+        model(x) -> a number or outputs (rows,), for estimates x (n,); preferably also for complex
+        x.
     x, u : array_like, shape (n,)
         Estimates and standard uncertainties, in the units of the inputs.
     names : sequence of str, length n, optional
-        Of the inputs, for the message.
+        Names of the inputs, for error messages.
 
     Returns
     -------
@@ -53,8 +66,8 @@ def sensitivities_of(model, x, u, names=None):
     Raises
     ------
     SolutionError
-        Naming an input at whose estimate the model has a kink or a jump, or when an output is not
-        finite.
+        If an output is not finite, or if the model has a kink or a jump at an estimate; the message
+        names the input.
 
     Examples
     --------
@@ -62,32 +75,64 @@ def sensitivities_of(model, x, u, names=None):
     [[12.0, 9.0]]
     """
     x, u = np.asarray(x, dtype=float), np.asarray(u, dtype=float)
-    found = _differences(model, x, u)
-    _refuse(~found.sound, found.doubt, names, "not smooth at the estimate of")
-    analytic = _complex_step(model, x, found.slopes.shape)
+    estimates = _differences(model, x, u)
+    _refuse(~estimates.sound, estimates.doubt, names, "not smooth at the estimate of")
+    analytic = _complex_step(model, x, estimates.slopes.shape)
     if analytic is None:
-        return found.slopes
-    off = np.abs(analytic - found.slopes)
-    return np.where(off <= found.doubt + _AGREEMENT * np.abs(found.slopes), analytic, found.slopes)
+        return estimates.slopes
+    deviation = np.abs(analytic - estimates.slopes)
+    # The complex step is used element by element, where it agrees with the differences.
+    return np.where(
+        deviation <= estimates.doubt + _AGREEMENT * np.abs(estimates.slopes),
+        analytic,
+        estimates.slopes,
+    )
 
 
 def check_sensitivities(model, x, u, sensitivities, names=None):
-    """Hold given (rows, n) sensitivities against central differences.
+    """Check given sensitivities against central differences.
 
-    Raises SolutionError naming the input whose contribution to u differs by over a thousandth of u
-    of that output, and ValueError for a wrong shape.
+    Parameters
+    ----------
+    model : callable
+        The model.
+    x, u : array_like, shape (n,)
+        Estimates and standard uncertainties.
+    sensitivities : ndarray, shape (rows, n)
+        Sensitivities to check.
+    names : sequence of str, length n, optional
+        Names of the inputs, for error messages.
+
+    Raises
+    ------
+    SolutionError
+        If a contribution to u differs by more than a thousandth of u of the output; the message
+        names the input.
+    ValueError
+        For an array of the wrong shape.
     """
     x, u = np.asarray(x, dtype=float), np.asarray(u, dtype=float)
-    found = _differences(model, x, u)
-    if sensitivities.shape != found.slopes.shape:
-        raise ValueError(f"sensitivities {sensitivities.shape}, expected {found.slopes.shape}")
-    off = np.abs(sensitivities - found.slopes)
-    wrong = (off - found.doubt) * u > _AGREEMENT * _total(found.slopes, u)
-    _refuse(wrong, off, names, "contradicted by differences over")
+    estimates = _differences(model, x, u)
+    if sensitivities.shape != estimates.slopes.shape:
+        raise ValueError(f"sensitivities {sensitivities.shape}, expected {estimates.slopes.shape}")
+    deviation = np.abs(sensitivities - estimates.slopes)
+    # The deviation counts only beyond the error of the differences.
+    wrong = (deviation - estimates.doubt) * u > _AGREEMENT * _combined_uncertainty(
+        estimates.slopes, u
+    )
+    _refuse(wrong, deviation, names, "contradicted by differences over")
 
 
 def outputs_of(model, x):
-    """(rows,) outputs at x; raises SolutionError when one is not finite."""
+    """Outputs (rows,) of a model at x.
+
+    Raises
+    ------
+    SolutionError
+        If an output is not finite.
+    ValueError
+        If the model returns an array of another shape.
+    """
     values = np.atleast_1d(np.asarray(model(x), dtype=float))
     if values.ndim != 1:
         raise ValueError(f"the model gives {values.shape}: expected a number or (rows,)")
@@ -97,19 +142,20 @@ def outputs_of(model, x):
 
 
 def _differences(model, x, u):
-    """The first sound differences of each sensitivity, over ever smaller steps."""
+    """Differences with decreasing steps; the first valid result of each sensitivity is kept."""
     middle = outputs_of(model, x)
     chosen = None
     for share in _SHARES:
+        # All steps are judged by the reach of the first, largest step.
         reach = None if chosen is None else chosen.reach
-        now = _differences_over(model, x, u, middle, _steps(x, u) * share, reach)
+        current = _differences_over(model, x, u, middle, _choose_steps(x, u) * share, reach)
         if chosen is None:
-            chosen = now
-        better = now.sound & ~chosen.sound
+            chosen = current
+        better = current.sound & ~chosen.sound
         chosen = _Differences(
-            np.where(better, now.slopes, chosen.slopes),
-            np.where(better, now.doubt, chosen.doubt),
-            chosen.sound | now.sound,
+            np.where(better, current.slopes, chosen.slopes),
+            np.where(better, current.doubt, chosen.doubt),
+            chosen.sound | current.sound,
             reach=chosen.reach,
         )
         if np.all(chosen.sound):
@@ -118,15 +164,17 @@ def _differences(model, x, u):
 
 
 def _differences_over(model, x, u, middle, steps, reach=None):
-    coarse, bend = _central(model, x, middle, steps)
+    """Differences over given steps (n,), extrapolated, with their validity."""
+    coarse, bend = _central_differences(model, x, middle, steps)
     if reach is None:
         reach = (np.abs(coarse) + np.abs(bend) / 2) * u
-    fine, finer_bend = _central(model, x, middle, steps / 2)
+    fine, finer_bend = _central_differences(model, x, middle, steps / 2)
+    # Richardson: the error is quadratic in the step.
     slopes = fine + (fine - coarse) / 3
     rounding = _ROUNDING * np.abs(middle)[:, None] / steps
-    allowed = _AGREEMENT * np.maximum(_total(slopes, u), reach)
+    allowed = _AGREEMENT * np.maximum(_combined_uncertainty(slopes, u), reach)
     curved = np.abs(fine - coarse)
-    # twice the mean slope of a kink stays when the step is halved; that of a curve is halved
+    # Halving the step halves the difference of both slopes for a curve, but not for a kink.
     kink = (np.abs(finer_bend) > 0.75 * np.abs(bend)) & (
         (np.abs(finer_bend) - rounding) * u > allowed
     )
@@ -134,50 +182,56 @@ def _differences_over(model, x, u, middle, steps, reach=None):
     return _Differences(slopes, curved + rounding, sound, reach)
 
 
-def _central(model, x, middle, steps):
-    """(rows, n) slopes over +- steps, and by how much the slopes of both sides differ."""
+def _central_differences(model, x, middle, steps):
+    """Slopes (rows, n) over +- steps, and difference of the slopes on both sides."""
     slopes, bends = [], []
     for i, step in enumerate(steps):
-        up, down = x.copy(), x.copy()
-        up[i], down[i] = x[i] + step, x[i] - step
-        above, below = outputs_of(model, up), outputs_of(model, down)
-        slopes.append((above - below) / (up[i] - down[i]))
-        bends.append((above - middle) / (up[i] - x[i]) - (middle - below) / (x[i] - down[i]))
+        x_up, x_down = x.copy(), x.copy()
+        x_up[i], x_down[i] = x[i] + step, x[i] - step
+        y_up, y_down = outputs_of(model, x_up), outputs_of(model, x_down)
+        # Divided by the step as stored, which rounding may have changed.
+        slopes.append((y_up - y_down) / (x_up[i] - x_down[i]))
+        bends.append((y_up - middle) / (x_up[i] - x[i]) - (middle - y_down) / (x[i] - x_down[i]))
     return np.stack(slopes, axis=1), np.stack(bends, axis=1)
 
 
-def _steps(x, u):
+def _choose_steps(x, u):
+    """Steps (n,): a quarter of u, but large enough to exceed rounding of x."""
+    # For an input without uncertainty: the step that balances rounding and truncation.
     least = np.finfo(float).eps ** (1 / 3) * np.maximum(np.abs(x), 1e-3)
     return np.where(u > 0, np.maximum(u / 4, 2**14 * np.spacing(np.abs(x))), least)
 
 
-def _total(slopes, u):
-    """(rows, 1) u of each output without correlations."""
+def _combined_uncertainty(slopes, u):
+    """Standard uncertainty (rows, 1) of each output, without correlations."""
     return np.sqrt(np.sum((slopes * u) ** 2, axis=1, keepdims=True))
 
 
 def _complex_step(model, x, shape):
-    """(rows, n) by complex step, or None where the model takes no complex numbers."""
+    """Derivatives (rows, n) by complex step; None if the model does not accept complex numbers."""
     columns = []
     for i in range(len(x)):
-        moved = x.astype(complex)
-        moved[i] += 1j * _COMPLEX_STEP
+        shifted = x.astype(complex)
+        shifted[i] += 1j * _COMPLEX_STEP
         try:
             with warnings.catch_warnings():
+                # A discarded imaginary part would give a zero derivative.
                 warnings.simplefilter("error", np.exceptions.ComplexWarning)
-                values = np.atleast_1d(np.asarray(model(moved)))
+                values = np.atleast_1d(np.asarray(model(shifted)))
         except (TypeError, ValueError, ArithmeticError, np.exceptions.ComplexWarning):
             return None
+        # A real result has lost the imaginary part.
         if not np.iscomplexobj(values) or values.shape != shape[:1]:
             return None
         columns.append(values.imag / _COMPLEX_STEP)
-    found = np.stack(columns, axis=1)
-    return found if np.all(np.isfinite(found)) else None
+    jacobian = np.stack(columns, axis=1)
+    return jacobian if np.all(np.isfinite(jacobian)) else None
 
 
-def _refuse(wrong, sizes, names, what):
+def _refuse(wrong, sizes, names, reason):
+    """Raise SolutionError for the first wrong sensitivity."""
     if np.any(wrong):
         row, column = np.argwhere(wrong)[0]
         name = names[column] if names else f"input {column + 1}"
         size = sizes[row, column]
-        raise SolutionError(f"sensitivity of output {row + 1} {what} {name}: {size:.3g} apart")
+        raise SolutionError(f"sensitivity of output {row + 1} {reason} {name}: {size:.3g} apart")

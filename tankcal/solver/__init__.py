@@ -1,11 +1,13 @@
-"""Least squares that knows no geometry, for many unknowns: Gauss-Markov with block structure.
+"""Least squares without geometry, for many unknowns: Gauss-Markov model with blocks.
 
-Rows F(x) - l, whitened; unknowns that occur in blocks of three, no two of them in one row, are
-eliminated (Schur complement), the rest is solved densely:
+The rows are F(x) - l, whitened. Some unknowns form blocks of three, and no row depends on two
+blocks. These blocks are eliminated (Schur complement), and the remaining system is solved as a
+dense system:
 
     N = [V  W; W' R],   S = R - W' V^-1 W,   Q_xx = S^-1,   Q_bb = V^-1 + V^-1 W S^-1 W' V^-1
 
-Small problems with conditions between observations go through tankcal.adjust instead.
+Small problems with conditions between observations are solved by tankcal.adjust.
+
 Source: Brown 1958; Triggs et al. 2000, Bundle adjustment - a modern synthesis, sections 6, 9.
 """
 

@@ -1,16 +1,17 @@
-"""Loops that are plain Python and run compiled when numba is there.
+"""Loops in plain Python, which are compiled if numba is available.
 
-A room writes its loops as ordinary functions beside their array form; here they are compiled, when
-first asked for, with the results kept beside the source file. All functions that call one another
-must live in one module: numba looks only at that file's date when it decides whether what it kept
-is still true.
+A module writes its loops as ordinary functions next to their array form. This module compiles them
+at their first use and stores the result next to the source file. All functions that call each other
+must be in the same module, because numba checks only the date of that file before it reuses a
+stored result.
 
-Compiling takes 9 s, once on a machine, and loading what was kept 0.3 s in each run. The array form
-needs about 12 us for an image point in an iteration (elimination included), compiled loops less
-than a tenth of that. So arrays do the work of small problems: no small job waits for a compiler,
-and fewer rows are enough where compiled loops lie beside the package, made at installation by
-`python -m tankcal.cli.kernels`. They are read from there also where nothing may be written.
-TANKCAL_COMPILED=1 compiles at first use, 0 never.
+Compilation takes 9 s, once for each machine. Loading the stored result takes 0.3 s in each run. The
+array form needs about 12 us for an image point in an iteration (with elimination), compiled loops
+less than a tenth of this time. Small problems therefore use arrays, and no small job waits for the
+compiler. A lower threshold applies if compiled loops exist in the package, created at installation
+by `python -m tankcal.cli.kernels`. They are also read from a directory without write access.
+
+The environment variable TANKCAL_COMPILED=1 compiles at first use, TANKCAL_COMPILED=0 never.
 """
 
 import hashlib
@@ -24,15 +25,15 @@ from types import FunctionType, SimpleNamespace
 
 from tankcal.memory import without_collection
 
-AT_ONCE = 20_000  # rows of a problem from which compiling pays: 0.3 s an iteration
-LOADING = 0.05  # of that is enough where loops need not be compiled, only loaded
-FAST = {"contract", "reassoc", "nsz"}  # sums in any order; NaN and infinity stay what they are
+AT_ONCE = 20_000  # rows from which compilation saves time: 0.3 s in each iteration
+LOADING = 0.05  # fraction of AT_ONCE that suffices if compiled loops only need loading
+FAST = {"contract", "reassoc", "nsz"}  # sums in any order; NaN and infinity are preserved
 OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": FAST}
 
 
 @cache
 def available():
-    """True when loops can be compiled; TANKCAL_COMPILED=0 turns that off."""
+    """Whether loops can be compiled; TANKCAL_COMPILED=0 disables compilation."""
     if _asked_for() == "0":
         return False
     return importlib.util.find_spec("numba") is not None
@@ -40,6 +41,7 @@ def available():
 
 @cache
 def _asked_for():
+    """Value of TANKCAL_COMPILED, by default "patient": compile large problems only."""
     return os.environ.get("TANKCAL_COMPILED", "patient")
 
 
@@ -52,14 +54,21 @@ _SOURCES = (
 _MARK = Path(__file__).parent / "__pycache__" / "kernels.txt"
 
 
-def _stamp():
-    return hashlib.sha256(b"".join(one.read_bytes() for one in _SOURCES)).hexdigest()
+def _hash_sources():
+    """SHA-256 of all source files with compiled loops, as hexadecimal text."""
+    return hashlib.sha256(b"".join(path.read_bytes() for path in _SOURCES)).hexdigest()
 
 
 def mark_as_kept():
-    """Say that compiled loops of these sources lie beside them; False where nothing is written."""
+    """Record that compiled loops of the present sources exist next to the sources.
+
+    Returns
+    -------
+    bool
+        False if the directory is not writable or contains no compiled loops.
+    """
     try:
-        _MARK.write_text(_stamp(), encoding="utf-8")
+        _MARK.write_text(_hash_sources(), encoding="utf-8")
     except OSError:
         return False
     return any(_MARK.parent.glob("loops._eliminate-*.nbi"))
@@ -67,12 +76,20 @@ def mark_as_kept():
 
 @cache
 def are_kept():
-    """True when an installation has compiled the loops (`tankcal.cli.kernels`) as they are now.
+    """Whether an installation has compiled the loops of the present sources.
 
-    What a large job left behind does not count, or a job would depend on those before it.
+    Returns
+    -------
+    bool
+
+    Notes
+    -----
+    Loops compiled by a large job do not count. Otherwise the result of a job would depend on
+    earlier jobs.
     """
+    # The mark is written only by `tankcal.cli.kernels`, never by a job.
     try:
-        return _MARK.read_text(encoding="utf-8") == _stamp()
+        return _MARK.read_text(encoding="utf-8") == _hash_sources()
     except (OSError, UnicodeDecodeError):
         return False
 
@@ -82,92 +99,108 @@ _rows = ContextVar("rows of the problem at hand", default=0)
 
 @contextmanager
 def problem_of(rows):
-    """A context in which the loops over any part are those of a problem of so many rows."""
-    before = _rows.set(rows)
-    try:
-        yield
-    finally:
-        _rows.reset(before)
-
-
-def is_worth_compiling(rows=0):
-    """Whether compiled loops are to be used.
-
-    It hangs on the size of the problem, never on what this process did before: compiled loops and
-    arrays differ in the last digits, and the same job is to give the same ones. Loops that lie
-    beside the package count, however they came there: a large problem leaves its own.
+    """Context manager in which all loops use the form chosen for a problem of this size.
 
     Parameters
     ----------
-    rows : int, default 0
-        To be worked through, where that is more than those of `problem_of`.
+    rows : int
+        Number of rows of the problem.
+    """
+    token = _rows.set(rows)
+    try:
+        yield
+    finally:
+        _rows.reset(token)
+
+
+def is_worth_compiling(rows=0):
+    """Whether to use compiled loops.
+
+    Parameters
+    ----------
+    rows : int, optional
+        Number of rows, if larger than the number set by `problem_of`.
 
     Returns
     -------
     bool
-        False below the rows that pay for the compiler, or for loading what it made before; where
-        TANKCAL_COMPILED is 1 or 0: `available()`.
+        False below the number of rows that justifies compilation, or loading of compiled loops.
+        With TANKCAL_COMPILED set to 1 or 0, the result of `available()`.
+
+    Notes
+    -----
+    The result depends on the size of the problem, never on earlier work of this process. Compiled
+    loops and arrays differ in the last digits, and a job must reproduce its digits. Compiled loops
+    of an installation lower the threshold, see `are_kept`.
     """
     if _asked_for() != "patient":
         return available()
-    enough = LOADING * AT_ONCE if are_kept() else AT_ONCE
-    return max(rows, _rows.get()) >= enough and available()
+    # Loading takes a fraction of the time of compilation, so fewer rows justify it.
+    threshold = LOADING * AT_ONCE if are_kept() else AT_ONCE
+    return max(rows, _rows.get()) >= threshold and available()
 
 
 @cache
 def compile_functions(module, names):
-    """Compile functions of one module; the compiled ones call each other, not the plain ones.
+    """Compile functions of a module, so that the compiled functions call each other.
 
     Parameters
     ----------
     module : module
+        The module.
     names : tuple of str
-        Names of its functions, those that are called before those that call them.
+        Names of the functions; a called function precedes its callers.
 
     Returns
     -------
     SimpleNamespace
-        The compiled functions by their names; compiled once in a process.
+        Compiled functions by name, compiled once in each process.
     """
-    known = dict(vars(module))
-    called = {one for name in names for one in known[name].__code__.co_names}
+    namespace = dict(vars(module))
+    called_names = {callee for name in names for callee in namespace[name].__code__.co_names}
     with without_collection():
         import numba
 
+        # Each function is bound to a namespace in which the functions before it are already
+        # compiled; the module itself stays unchanged.
         for name in names:
-            plain = known[name]
-            bound = FunctionType(plain.__code__, known, name, plain.__defaults__)
-            bound.__module__, bound.__qualname__ = plain.__module__, plain.__qualname__
-            known[name] = _jitted(numba, bound, name in called)
-    return SimpleNamespace(**{name: known[name] for name in names})
+            plain = namespace[name]
+            function = FunctionType(plain.__code__, namespace, name, plain.__defaults__)
+            function.__module__, function.__qualname__ = plain.__module__, plain.__qualname__
+            namespace[name] = _compile_function(numba, function, name in called_names)
+    return SimpleNamespace(**{name: namespace[name] for name in names})
 
 
-def _jitted(numba, function, into_others):
-    """A compiled function; into_others: its code becomes part of those that call it."""
-    compiled = numba.njit(**OPTIONS, forceinline=into_others)(function)
+def _compile_function(numba, function, inline):
+    """Compile a function with numba; `inline` inserts its code into the callers."""
+    compiled = numba.njit(**OPTIONS, forceinline=inline)(function)
+    # Results stored in the package are read first: numba alone reads only a writable directory.
     try:
         compiled.enable_caching()
-    except RuntimeError:  # nowhere to keep the result: compile in each run
-        usual = None
+    except RuntimeError:  # no writable directory: compile in each run
+        writable_cache = None
     else:
-        usual = compiled._cache
-    beside = _kept_beside(function)
-    if beside is not None:
-        compiled._cache = _Kept(beside, usual)
+        writable_cache = compiled._cache
+    package_cache = _open_package_cache(function)
+    if package_cache is not None:
+        compiled._cache = _Kept(package_cache, writable_cache)
     return compiled
 
 
-def _kept_beside(function):
-    """The cache of numba beside the source, to be read only; None where it cannot be had.
+def _open_package_cache(function):
+    """Open numba's cache next to the source, read-only; None if it is not available.
 
-    The one that numba chooses is there, too, but only where it may write.
+    The cache directory chosen by numba may be the same, but only if it is writable.
     """
+    # These classes are internal to numba: without them only the cache chosen by numba is used.
     try:
         from numba.core import caching
 
         class Beside(caching.InTreeCacheLocator):
+            """Locator of the cache next to the source file."""
+
             def ensure_cache_path(self):
-                """Nothing is written."""
+                """Accept a directory without write access."""
 
         class Format(caching.CompileResultCacheImpl):
             _locator_classes = (Beside,)
@@ -181,9 +214,14 @@ def _kept_beside(function):
 
 
 class _Kept:
-    """A cache of compiled functions as numba asks it: kept beside the source, else where it may.
+    """Cache of compiled functions in numba's interface: package first, then numba's directory.
 
-    beside, usual  caches of numba; the second is None where nothing may be written
+    Parameters
+    ----------
+    beside : object
+        Cache of numba next to the source, read-only.
+    usual : object or None
+        Cache in the directory chosen by numba; None without a writable directory.
     """
 
     def __init__(self, beside, usual):
@@ -191,14 +229,14 @@ class _Kept:
         self.cache_path = (usual or beside).cache_path
 
     def load_overload(self, signature, target):
-        """The compiled function of a signature, None: it is not kept."""
+        """Compiled function for a signature, or None if it is not stored."""
         with without_collection():
-            found = self.beside.load_overload(signature, target)
-            if found is None and self.usual is not None:
-                found = self.usual.load_overload(signature, target)
-        return found
+            overload = self.beside.load_overload(signature, target)
+            if overload is None and self.usual is not None:
+                overload = self.usual.load_overload(signature, target)
+        return overload
 
     def save_overload(self, signature, data):
-        """Keep a compiled function."""
+        """Store a compiled function in the directory chosen by numba."""
         if self.usual is not None:
             self.usual.save_overload(signature, data)

@@ -1,11 +1,12 @@
-"""Functions of the unknowns: their variances, and what an error in a row does to the unknowns.
+"""Functions of the unknowns: their variances, and the effect of an error in a row.
 
-A row's error e (whitened, observed side) changes the unknowns by Q J' e, with J the row. Where
-conditions hold exactly, an error d in condition i changes the reduced unknowns by
+An error e of a row J (whitened, in the observation) changes the unknowns by Q J' e. For exact
+conditions, an error d in condition i, in the unit of the condition, changes the reduced unknowns by
 
-    D [Q1 Q2] [y; -S22^-1 S21 y],   y = R^-T d,   d in the condition's own unit
+    D [Q1 Q2] [y; -S22^-1 S21 y],   y = R^-T d
 
-and C'k = -g gives what pulls at it, with cofactors R^-1 (S11 - S12 S22^-1 S21) R^-T.
+The reactions k of the conditions follow from C'k = -g. Their cofactors are R^-1 (S11 - S12 S22^-1
+S21) R^-T.
 """
 
 import numpy as np
@@ -16,32 +17,32 @@ from tankcal.solver.elimination import leverage
 from tankcal.solver.model import s_transform
 from tankcal.solver.threads import threads_for
 
-UNTESTED = 1e-10  # share of a pull that others cannot take: below it is rounding
-AT_ONCE = 4e6  # numbers of a dense part that is worked on at a time
+UNTESTED = 1e-10  # relative variance of a reaction below which only rounding remains
+AT_ONCE = 4e6  # elements of a dense matrix processed at a time
 
 
 def variances(cofactors, columns, jac):
-    """Variances of functions of the unknowns, also of functions that are not observed.
+    """Variances of functions of the unknowns, including functions that are not observed.
 
         s2 = J Q J'
 
     Parameters
     ----------
     cofactors : Cofactors
-        Of the adjustment: `Adjustment.cofactor`.
-    columns : ndarray, shape (n, K)
-        Number of the unknown of each derivative, -1 where it is fixed.
+        Result of the adjustment: `Adjustment.cofactor`.
+    columns : ndarray of int, shape (n, K)
+        Unknown of each derivative, -1 for a fixed unknown.
     jac : ndarray, shape (n, m, K)
-        Derivatives of n times m functions, unit of the function per unit of the unknown.
+        Derivatives of n times m functions, in the unit of the function per unit of the unknown.
 
     Returns
     -------
     ndarray, shape (n, m)
-        Variance of each function for variance factor 1, its unit squared.
+        Variance of each function for variance factor 1, in its unit squared.
 
     Examples
     --------
-    The sum of two unknowns, each observed once with a standard deviation of 1:
+    The sum of two unknowns, each observed once with a standard uncertainty of 1:
 
     >>> import numpy as np
     >>> from tankcal.solver import Group, Model, solve
@@ -49,208 +50,230 @@ def variances(cofactors, columns, jac):
     ...     w[:, 0] = x - [1.0, 3.0]
     ...     if len(jac):
     ...         jac[:] = 1.0
-    >>> each = Group(np.array([[0], [1]]), 1, fill)
-    >>> found = solve(Model(2, 0, (each,), lambda x, step: x + step), np.zeros(2))
-    >>> variances(found.cofactor, np.array([[0, 1]]), np.ones((1, 1, 2)))
+    >>> group = Group(np.array([[0], [1]]), 1, fill)
+    >>> result = solve(Model(2, 0, (group,), lambda x, step: x + step), np.zeros(2))
+    >>> variances(result.cofactor, np.array([[0, 1]]), np.ones((1, 1, 2)))
     array([[2.]])
     """
     n, m, _ = jac.shape
-    rows, found = sparse_rows(cofactors.model.unknowns, columns, jac), []
+    rows, results = sparse_rows(cofactors.model.unknowns, columns, jac), []
     with threads_for(cofactors.plan.reduced):
-        for part in _parts(n * m, cofactors.plan.reduced + 3):
-            found.append(_variances(cofactors, rows[part]))
-    return np.concatenate(found).reshape(n, m) if found else np.zeros((n, m))
+        for part in _split_rows(n * m, cofactors.plan.reduced + 3):
+            results.append(_row_variances(cofactors, rows[part]))
+    return np.concatenate(results).reshape(n, m) if results else np.zeros((n, m))
 
 
-def _variances(cofactors, rows):
-    own, reduced = _through(cofactors, rows)
+def _row_variances(cofactors, rows):
+    """Variances (k,) of sparse rows (k, unknowns)."""
+    block_part, reduced = _reduce_rows(cofactors, rows)
     whitened = cofactors.factor.whitened(reduced.T)
-    found = np.sum(whitened**2, axis=0) + np.asarray(own.multiply(own).sum(axis=1)).ravel()
+    # J Q J' = |E L^-T|^2 + |L_S^-1 D (F - E V^-1 W')'|^2.
+    result = (
+        np.sum(whitened**2, axis=0)
+        + np.asarray(block_part.multiply(block_part).sum(axis=1)).ravel()
+    )
+    # Datum transformation: J (G M G' - 2 H G') J'.
     if cofactors.datum is not None:
         free, h, m = cofactors.datum
-        by_free, by_h = rows @ free, rows @ h
-        found += np.einsum("nd,nd->n", by_free @ m - 2 * by_h, by_free)
-    return np.maximum(found, 0.0)
+        rows_free, rows_h = rows @ free, rows @ h
+        result += np.einsum("nd,nd->n", rows_free @ m - 2 * rows_h, rows_free)
+    # Rounding may leave a small negative variance.
+    return np.maximum(result, 0.0)
 
 
-def _through(cofactors, rows):
-    """A matrix of rows in whitened blocks (sparse) and, with the blocks eliminated, (k, nr)."""
+def _reduce_rows(cofactors, rows):
+    """Split sparse rows into whitened block parts (sparse) and reduced parts (k, nr)."""
     plan = cofactors.plan
     reduced = rows[:, : plan.reduced].toarray()
     if not plan.blocks:
         return scipy.sparse.csr_array((rows.shape[0], 0)), reduced
-    of_blocks = rows[:, plan.reduced :]
-    own = scipy.sparse.csr_array(of_blocks @ cofactors.block_diagonal)
-    return own, reduced + of_blocks @ cofactors.back_substitution
+    block_rows = rows[:, plan.reduced :]
+    # E L^-T, and F - E V^-1 W'.
+    whitened_blocks = scipy.sparse.csr_array(block_rows @ cofactors.block_diagonal)
+    return whitened_blocks, reduced + block_rows @ cofactors.back_substitution
 
 
 def responses(cofactors, columns, jac):
-    """What an error of one in each row changes in all unknowns, Q J', part by part.
+    """Iterate over the changes Q J' of all unknowns caused by a unit error in each row.
 
     Parameters
     ----------
     cofactors : Cofactors
-        Of the adjustment.
-    columns : ndarray, shape (n, K)
-        Number of the unknown of each derivative, -1 where it is fixed.
+        Result of the adjustment.
+    columns : ndarray of int, shape (n, K)
+        Unknown of each derivative, -1 for a fixed unknown.
     jac : ndarray, shape (n, m, K)
-        Whitened rows of observations; for any other functions see `covariances`.
+        Whitened rows of observations; for other functions see `covariances`.
 
     Yields
     ------
     part : slice
-        Which of the n times m rows.
+        Range within the n times m rows.
     change : ndarray, shape (unknowns, k)
-        Change of the unknowns by each of these k rows.
+        Change of the unknowns for each of the k rows in this range.
     """
     n, m, _ = jac.shape
     rows = sparse_rows(cofactors.model.unknowns, columns, jac)
-    for part in _parts(n * m, cofactors.model.unknowns):
-        found = _response(cofactors, rows[part])
+    for part in _split_rows(n * m, cofactors.model.unknowns):
+        change = _row_responses(cofactors, rows[part])
+        # Observations do not depend on the datum (J G = 0), so that T Q T' J' = Q J' - G H'J'.
         if cofactors.datum is not None:
             free, h, _ = cofactors.datum
-            found -= free @ (rows[part] @ h).T
-        yield part, found
+            change -= free @ (rows[part] @ h).T
+        yield part, change
 
 
 def covariances(cofactors, columns, jac):
-    """Covariances of all unknowns with functions of some of them, Q J'.
+    """Covariances Q J' of all unknowns with functions of the unknowns.
 
-    Unlike in `responses` the functions may be any, not only what observations determine: where a
-    datum is chosen they may change with it.
+    Unlike `responses`, this function also accepts functions that the observations do not determine.
+    Such functions may depend on the datum.
 
     Parameters
     ----------
     cofactors : Cofactors
-        Of the adjustment.
-    columns : ndarray, shape (K,)
-        Number of the unknown of each derivative, -1 where it is fixed.
+        Result of the adjustment.
+    columns : ndarray of int, shape (K,)
+        Unknown of each derivative, -1 for a fixed unknown.
     jac : ndarray, shape (m, K)
         Derivatives of the functions.
 
     Returns
     -------
     ndarray, shape (unknowns, m)
-        For variance factor 1.
+        Covariances for variance factor 1.
     """
-    rows, found = sparse_rows(cofactors.model.unknowns, columns[None], jac[None]), []
+    rows, result = sparse_rows(cofactors.model.unknowns, columns[None], jac[None]), []
     with threads_for(cofactors.plan.reduced):
-        for part in _parts(len(jac), cofactors.model.unknowns):
-            found.append(_response(cofactors, rows[part]))
-    found = np.hstack(found)
+        for part in _split_rows(len(jac), cofactors.model.unknowns):
+            result.append(_row_responses(cofactors, rows[part]))
+    result = np.hstack(result)
     if cofactors.datum is not None:
         free, h, m = cofactors.datum
-        by_free = rows @ free
-        found += free @ (m @ by_free.T - (rows @ h).T) - h @ by_free.T
-    return found
+        # T Q T' J' = Q J' + G (M G'J' - H'J') - H G'J'.
+        rows_free = rows @ free
+        result += free @ (m @ rows_free.T - (rows @ h).T) - h @ rows_free.T
+    return result
 
 
-def _response(cofactors, rows):
-    """Q J' (unknowns, k) of a sparse matrix of rows (k, unknowns), in the datum of the factor."""
-    own, reduced = _through(cofactors, rows)
-    found = cofactors.back_substitute_covariance(cofactors.factor.solved(reduced.T))
+def _row_responses(cofactors, rows):
+    """Q J' (unknowns, k) of sparse rows (k, unknowns), in the datum of the factor."""
+    block_part, reduced = _reduce_rows(cofactors, rows)
+    changes = cofactors.back_substitute_covariance(cofactors.factor.solved(reduced.T))
     if cofactors.plan.blocks:
-        found[cofactors.plan.reduced :] += (cofactors.block_diagonal @ own.T).toarray()
-    return found
+        changes[cofactors.plan.reduced :] += (cofactors.block_diagonal @ block_part.T).toarray()
+    return changes
 
 
 def cofactors_within(cofactors, group, rows):
-    """Cofactors of the values of each observation with one another, J Q J'.
-
-    Two values by those of each and of their sum: 2 q_ab = q_(a+b)(a+b) - q_aa - q_bb.
+    """Cofactors J Q J' of the values of each observation with each other.
 
     Parameters
     ----------
     cofactors : Cofactors
-        Of the adjustment.
+        Result of the adjustment.
     group : int
-        Number of the group.
-    rows : ndarray, shape (n,)
-        Numbers of its observations, each once, in any order.
+        Index of the group.
+    rows : ndarray of int, shape (n,)
+        Indices of distinct observations of the group, in any order.
 
     Returns
     -------
     ndarray, shape (n, m, m)
-        For variance factor 1.
+        Cofactors for variance factor 1.
+
+    Notes
+    -----
+    The cofactor of two values follows from the cofactor of their sum: 2 q_ab = q_(a+b)(a+b) - q_aa
+    - q_bb.
     """
     jac, plan = cofactors.jacobians[group], cofactors.plan
     values = np.arange(jac.shape[1])
-    found = np.zeros((len(rows), len(values), len(values)))
-    of_block, cross = cofactors.of_blocks
+    result = np.zeros((len(rows), len(values), len(values)))
+    block_cofactors, cross = cofactors.of_blocks
     for batch in plan.batches:
         if batch.group != group:
             continue
-        inside, batch = batch.taken(rows, len(jac))
-        if not inside.any():
+        members, batch = batch.taken(rows, len(jac))
+        if not members.any():
             continue
-        mine, q = batch.of(jac[rows[inside]]), np.zeros((len(batch.first), *found.shape[1:]))
+        derivatives, q = (
+            batch.of(jac[rows[members]]),
+            np.zeros((len(batch.first), *result.shape[1:])),
+        )
+        # Shift 0 gives the diagonal; each further shift pairs every value with another value.
         for shift in range(len(values) // 2 + 1):
-            other = (values + shift) % len(values)
-            both = mine + mine[:, other] if shift else mine
-            q_both = leverage(plan, batch, both, cofactors.reduced_cofactors, cross, of_block)
+            shifted = (values + shift) % len(values)
+            summed = derivatives + derivatives[:, shifted] if shift else derivatives
+            q_summed = leverage(
+                plan, batch, summed, cofactors.reduced_cofactors, cross, block_cofactors
+            )
             if shift:
-                own = q[:, values, values]
-                q_both = (q_both - own - own[:, other]) / 2
-            q[:, values, other] = q[:, other, values] = q_both
-        found[inside] = q
-    return found
+                diagonal = q[:, values, values]
+                q_summed = (q_summed - diagonal - diagonal[:, shifted]) / 2
+            q[:, values, shifted] = q[:, shifted, values] = q_summed
+        result[members] = q
+    return result
 
 
 def own_responses(cofactors, group, jac):
-    """What an error of one in a row changes in the point that the row is about.
+    """Change of the observed point caused by a unit error in each row.
 
     Parameters
     ----------
     cofactors : Cofactors
-        Of the adjustment.
+        Result of the adjustment.
     group : int
-        Number of a group whose first three columns are that point.
+        Index of a group whose first three columns are the observed point.
     jac : ndarray, shape (n, m, K)
         All rows of the group, whitened.
 
     Returns
     -------
     ndarray, shape (n, m, 3)
-        Change of the three unknowns, in their unit.
+        Change of the three coordinates, in their unit.
     """
     plan, out = cofactors.plan, np.zeros((*jac.shape[:2], 3))
-    of_block, cross = cofactors.of_blocks
+    block_cofactors, cross = cofactors.of_blocks
+    # The additional zero row and column stand for fixed unknowns.
     inverse = np.pad(cofactors.reduced_cofactors, (0, 1))
     for batch in plan.batches:
         if batch.group != group:
             continue
-        mine = batch.of(jac)
+        derivatives = batch.of(jac)
         if batch.block is None:
             q = inverse[batch.columns[:, :3, None], batch.columns[:, None, :]]
-            out[batch.rows] = np.einsum("nab,nmb->nma", q, mine)
+            out[batch.rows] = np.einsum("nab,nmb->nma", q, derivatives)
             continue
-        found = np.einsum("nab,nmb->nma", of_block[batch.block], mine[:, :, :3])
-        found += np.einsum("nka,nmk->nma", cross[batch.places], mine[:, :, 3:])
-        out[batch.rows] = found
+        # Q_bb E' + Q_br F'.
+        changes = np.einsum("nab,nmb->nma", block_cofactors[batch.block], derivatives[:, :, :3])
+        changes += np.einsum("nka,nmk->nma", cross[batch.places], derivatives[:, :, 3:])
+        out[batch.rows] = changes
+    # As in `responses`: an observation does not depend on the datum.
     if cofactors.datum is not None:
         columns = cofactors.model.groups[group].columns
         free, h, _ = (np.vstack([part, np.zeros((1, part.shape[1]))]) for part in cofactors.datum)
-        by_h = np.einsum("nmk,nkd->nmd", jac, h[columns])
-        out -= np.einsum("nad,nmd->nma", free[columns[:, :3]], by_h)
+        rows_h = np.einsum("nmk,nkd->nmd", jac, h[columns])
+        out -= np.einsum("nad,nmd->nma", free[columns[:, :3]], rows_h)
     return out
 
 
 def own_leverage(cofactors, group, jac):
-    """The part of each row's leverage that stays within its own block, E V^-1 E'.
+    """Part E V^-1 E' of the leverage of each row that arises within its block.
 
     Parameters
     ----------
     cofactors : Cofactors
-        Of the adjustment.
+        Result of the adjustment.
     group : int
-        Number of the group.
+        Index of the group.
     jac : ndarray, shape (n, m, K)
         All rows of the group, whitened.
 
     Returns
     -------
     ndarray, shape (n, m)
-        Without unit, 0 to 1; 0 for a row without a block.
+        Leverage, 0 to 1; 0 for a row without a block.
     """
     out = np.zeros(jac.shape[:2])
     for batch in cofactors.plan.batches:
@@ -262,28 +285,28 @@ def own_leverage(cofactors, group, jac):
 
 
 def constraint_reactions(cofactors):
-    """Reactions (Lagrange multipliers) of the exact conditions, and what each condition moves.
+    """Reactions (Lagrange multipliers) of the exact conditions, and their effects.
 
         C'k = -g,   g the gradient of half the sum of squares at the minimum
 
     Parameters
     ----------
     cofactors : Cofactors
-        Of the adjustment of a Model with `exact` conditions.
+        Result of the adjustment of a Model with `exact` conditions.
 
     Returns
     -------
     k : ndarray, shape (m,)
         Reaction of each condition, per unit of the condition.
     sd : ndarray, shape (m,)
-        Its standard deviation for variance factor 1; 0, as k, for a condition that follows from
-        others.
+        Standard deviation of the reaction for variance factor 1. Like k, it is 0 for a condition
+        that follows from other conditions.
     changes : ndarray, shape (unknowns, m)
-        Change of all unknowns when the value of a condition changes by one.
+        Change of all unknowns for a unit change in the value of a condition.
 
     Examples
     --------
-    Two unknowns, observed as 1 and 3 with a standard deviation of 1, that must be equal:
+    Two unknowns, observed as 1 and 3 with a standard uncertainty of 1, that must be equal:
 
     >>> import numpy as np
     >>> from tankcal.solver import Group, Model, solve
@@ -295,12 +318,13 @@ def constraint_reactions(cofactors):
     ...     w[0, 0] = x[0] - x[1]
     ...     if len(jac):
     ...         jac[:] = [1.0, -1.0]
-    >>> each, equal = Group(np.array([[0], [1]]), 1, fill), Group(np.array([[0, 1]]), 1, difference)
-    >>> model = Model(2, 0, (each,), lambda x, step: x + step, exact=(equal,))
-    >>> found = solve(model, np.zeros(2))
-    >>> found.unknowns.round(9).tolist()
+    >>> observed = Group(np.array([[0], [1]]), 1, fill)
+    >>> equal = Group(np.array([[0, 1]]), 1, difference)
+    >>> model = Model(2, 0, (observed,), lambda x, step: x + step, exact=(equal,))
+    >>> result = solve(model, np.zeros(2))
+    >>> result.unknowns.round(9).tolist()
     [2.0, 2.0]
-    >>> k, sd, changes = constraint_reactions(found.cofactor)
+    >>> k, sd, changes = constraint_reactions(result.cofactor)
     >>> k.round(3).tolist(), sd.round(3).tolist(), changes.round(3).tolist()
     ([-1.0], [0.707], [[0.5], [-0.5]])
     """
@@ -308,18 +332,25 @@ def constraint_reactions(cofactors):
     tangent, rank = factor.tangent, factor.tangent.rank
     k, sd = np.zeros(conditions.rows), np.zeros(conditions.rows)
     changes = np.zeros((cofactors.model.unknowns, conditions.rows))
-    first, _ = tangent.split(factor.scale * _gradient(cofactors))
+    # Q1' D g: at the minimum the gradient lies in the span of the conditions.
+    gradient, _ = tangent.split(factor.scale * _gradient(cofactors))
     s11, s12 = factor.reaction_part[:, :rank], factor.reaction_part[:, rank:]
-    follow = scipy.linalg.cho_solve((factor.lower, True), s12.T)
-    back = scipy.linalg.solve_triangular(tangent.r, np.eye(rank))  # R^-1
-    q = back @ (s11 - s12 @ follow) @ back.T
-    length, which = tangent.lengths[tangent.independent], tangent.independent
-    k[which] = -(back @ first) / length
-    variance, alone = np.diag(q), np.diag(back @ s11 @ back.T)
-    sd[which] = np.sqrt(np.where(variance > UNTESTED * alone, variance, 0.0)) / length
-    y = back.T / length
-    reduced = factor.scale[:, None] * tangent.from_null_space(-follow @ y, y)
-    changes[:, which] = cofactors.back_substitute_covariance(reduced)
+    # S22^-1 S21: response of the null space to a displacement across the conditions.
+    response = scipy.linalg.cho_solve((factor.lower, True), s12.T)
+    r_inverse = scipy.linalg.solve_triangular(tangent.r, np.eye(rank))  # R^-1
+    q = r_inverse @ (s11 - s12 @ response) @ r_inverse.T
+    length, independent_rows = tangent.lengths[tangent.independent], tangent.independent
+    k[independent_rows] = -(r_inverse @ gradient) / length
+    # A variance that is small against S11 alone is rounding: the observations do not test this
+    # condition.
+    variance, unreduced = np.diag(q), np.diag(r_inverse @ s11 @ r_inverse.T)
+    sd[independent_rows] = (
+        np.sqrt(np.where(variance > UNTESTED * unreduced, variance, 0.0)) / length
+    )
+    # R^-T for a unit change of each condition, whose row was scaled to length one.
+    y = r_inverse.T / length
+    reduced = factor.scale[:, None] * tangent.from_null_space(-response @ y, y)
+    changes[:, independent_rows] = cofactors.back_substitute_covariance(reduced)
     if cofactors.datum is not None:
         changes = s_transform(changes, factor.null_space, factor.datum_basis)
     return k, sd, changes
@@ -335,14 +366,14 @@ def _gradient(cofactors):
 
 
 def sparse_rows(unknowns, columns, jac):
-    """All rows as one sparse matrix over the unknowns.
+    """Assemble rows as a sparse matrix over all unknowns.
 
     Parameters
     ----------
     unknowns : int
         Number of unknowns.
-    columns : ndarray, shape (n, K)
-        Number of the unknown of each derivative, -1 where it is fixed.
+    columns : ndarray of int, shape (n, K)
+        Unknown of each derivative, -1 for a fixed unknown.
     jac : ndarray, shape (n, m, K)
         Derivatives.
 
@@ -365,7 +396,7 @@ def sparse_rows(unknowns, columns, jac):
     )
 
 
-def _parts(rows, width):
-    """Slices of so many rows that a dense array of that width stays small."""
+def _split_rows(rows, width):
+    """Split rows into slices, so that a dense array of this width stays within AT_ONCE."""
     step = max(1, int(AT_ONCE / max(width, 1)))
     return [slice(first, min(first + step, rows)) for first in range(0, rows, step)]

@@ -1,6 +1,6 @@
-"""The normal equations of a plan: compiled loops where they can be had, else whole arrays.
+"""Normal equations of a plan: compiled loops if available, otherwise array operations.
 
-Both forms give the same numbers but for rounding; see tankcal.solver.loops for the equations.
+Both forms give equal numbers except for rounding. See tankcal.solver.loops for the equations.
 """
 
 import numpy as np
@@ -11,15 +11,30 @@ from tankcal.solver.compiled import compile_functions, is_worth_compiling
 
 
 def add_rows(plan, batch, w, jac, normals):
-    """Add rows of a Batch of a Plan, w (n, m) and jac (n, m, K), to the Normals."""
+    """Add rows of a batch to the normal equations.
+
+    Parameters
+    ----------
+    plan : Plan
+        Structure of the normal equations.
+    batch : Batch
+        Description of the rows.
+    w : ndarray, shape (n, m)
+        Whitened misclosures.
+    jac : ndarray, shape (n, m, K)
+        Whitened derivatives; with a block, its three derivatives come first.
+    normals : Normals
+        Changed in place.
+    """
     if is_worth_compiling():
-        has = batch.block is not None
-        block, place = (batch.block, batch.place) if has else (batch.first, batch.first)
+        has_block = batch.block is not None
+        block, place = (batch.block, batch.place) if has_block else (batch.first, batch.first)
         compile_functions(loops, loops.COMPILED)._add_rows(
-            w, jac, has, block.ravel(), batch.first, place, batch.cuts, plan.starts,
+            w, jac, has_block, block.ravel(), batch.first, place, batch.cuts, plan.starts,
             normals.v, normals.wide, normals.b, normals.t, normals.g,
         )  # fmt: skip
         return
+    # E: derivatives by the block, F: derivatives by the reduced unknowns.
     f, columns = jac, batch.columns
     if batch.block is not None:
         e, f = jac[:, :, :3], jac[:, :, 3:]
@@ -27,37 +42,60 @@ def add_rows(plan, batch, w, jac, normals):
         np.add.at(normals.v, batch.block, square[:, *np.tril_indices(3)])
         np.add.at(normals.b, batch.block, np.einsum("nma,nm->na", e, w))
         np.add.at(normals.wide, plan.entries[batch.places], np.einsum("nmk,nma->nka", f, e))
+    # g += F'w. Fixed unknowns accumulate in the spare column and are ignored later.
     np.add.at(normals.g, columns, np.einsum("nmk,nm->nk", f, w))
+    # S += F'F: each product once, since only the upper half of S is stored.
     once = np.triu(np.ones((f.shape[2],) * 2)) * np.einsum("nma,nmb->nab", f, f)
     np.add.at(normals.t, (columns[:, :, None], columns[:, None, :]), once)
 
 
 def eliminate(plan, normals, damping, smallest):
-    """Eliminate the blocks in place; the first block that is not determined, or -1."""
+    """Eliminate the blocks from the normal equations, in place.
+
+    Parameters
+    ----------
+    plan : Plan
+        Structure of the normal equations.
+    normals : Normals
+        Changed in place.
+    damping : float
+        Relative increase of the diagonal of each block.
+    smallest : float
+        Smallest eigenvalue of a scaled block that counts as determined.
+
+    Returns
+    -------
+    int
+        Index of the first undetermined block, or -1.
+    """
     if is_worth_compiling(plan.rows):
         return compile_functions(loops, loops.COMPILED)._eliminate(
             normals.v, normals.wide, normals.b, plan.starts, plan.columns, plan.runs, plan.ends,
             plan.alike, normals.t, normals.g, damping, smallest,
         )  # fmt: skip
-    below = np.tril(normals.t, -1)  # add_rows has put each pair somewhere: into the upper half
-    normals.t += below.T - below
+    # add_rows may have stored a product below the diagonal: move it to the upper half.
+    lower_half = np.tril(normals.t, -1)
+    normals.t += lower_half.T - lower_half
     v = np.zeros((plan.blocks, 3, 3))
     v[:, *np.tril_indices(3)] = normals.v
     v += np.tril(v, -1).transpose(0, 2, 1)
     diagonal = np.einsum("nii->ni", v)
-    before = diagonal.copy()
+    previous_diagonal = diagonal.copy()
     diagonal *= 1 + damping
-    scale = np.sqrt(np.where(before > 0, before, 1.0))
+    # The rank of a block is judged with unit diagonal, independent of the units.
+    scale = np.sqrt(np.where(previous_diagonal > 0, previous_diagonal, 1.0))
     values = np.linalg.eigvalsh(v / (scale[:, :, None] * scale[:, None, :]))
-    bad = np.flatnonzero(~(values[:, 0] > smallest))
-    if len(bad):
-        return int(bad[0])
+    undetermined = np.flatnonzero(~(values[:, 0] > smallest))
+    if len(undetermined):
+        return int(undetermined[0])
+    # V = L L', y = L^-1 b, Y = wide L^-T.
     root = np.linalg.cholesky(v)
     normals.v[:] = root[:, *np.tril_indices(3)]
     normals.b[:] = np.linalg.solve(root, normals.b[:, :, None])[:, :, 0]
     owner = np.repeat(np.arange(plan.blocks), np.diff(plan.starts))
     entries = plan.entries[:-1]
     normals.wide[entries] = np.linalg.solve(root[owner], normals.wide[entries, None])[:, :, 0]
+    # Schur complement: S - Y Y' and g - Y y; here y holds Y' in the rows of the blocks.
     y = block_rows(plan, normals.wide)
     normals.t[:-1, :-1] -= np.triu((y.T @ y).toarray())
     normals.g[:-1] -= y.T @ normals.b.ravel()
@@ -65,7 +103,8 @@ def eliminate(plan, normals, damping, smallest):
 
 
 def block_rows(plan, wide):
-    """The wide part as a sparse matrix (3 nb, nr)."""
+    """Wide part of the normal equations as a sparse matrix (3 nb, nr)."""
+    # Each block has three rows with the same columns.
     ends = np.cumsum(np.repeat(np.diff(plan.starts), 3))
     columns = np.empty(3 * len(plan.columns), dtype=plan.columns.dtype)
     columns[plan.entries[:-1]] = plan.columns[:, None]
@@ -75,7 +114,22 @@ def block_rows(plan, wide):
 
 
 def back_substitute(plan, normals, reduced):
-    """L^-T (y + Y' reduced) of each block (nb, 3); the blocks' step is this with the other sign."""
+    """Solve the blocks for given reduced unknowns: L^-T (y + Y' reduced), shape (nb, 3).
+
+    Parameters
+    ----------
+    plan : Plan
+        Structure of the normal equations.
+    normals : Normals
+        Eliminated normal equations.
+    reduced : ndarray, shape (nr,)
+        Step of the reduced unknowns.
+
+    Returns
+    -------
+    ndarray, shape (nb, 3)
+        Step of the blocks with the opposite sign.
+    """
     if is_worth_compiling(plan.rows):
         out = np.empty((plan.blocks, 3))
         compile_functions(loops, loops.COMPILED)._back(
@@ -87,14 +141,15 @@ def back_substitute(plan, normals, reduced):
 
 
 def roots(normals):
-    """The Cholesky factors L (nb, 3, 3) of eliminated blocks."""
+    """Cholesky factors L (nb, 3, 3) of eliminated blocks."""
     v = np.zeros((len(normals.v), 3, 3))
     v[:, *np.tril_indices(3)] = normals.v
     return v
 
 
 def inverse_roots(normals):
-    """L^-1 (nb, 3, 3) of eliminated blocks."""
+    """Inverse Cholesky factors L^-1 (nb, 3, 3) of eliminated blocks."""
+    # L = [a 0 0; b c 0; d e f], inverted in closed form.
     a, b, c, d, e, f = normals.v.T
     inverse = np.zeros((len(normals.v), 3, 3))
     inverse[:, 0, 0], inverse[:, 1, 1], inverse[:, 2, 2] = 1 / a, 1 / c, 1 / f
@@ -104,7 +159,7 @@ def inverse_roots(normals):
 
 
 def through_reduced(plan, normals, unknowns):
-    """How each of some unknowns (k,) follows the reduced ones: (nr, k), d unknown / d reduced."""
+    """Derivatives (nr, k) of selected unknowns (k,) by the reduced unknowns."""
     nr = plan.reduced
     out = np.zeros((len(unknowns), nr))
     if is_worth_compiling(plan.rows):
@@ -112,14 +167,16 @@ def through_reduced(plan, normals, unknowns):
             normals.v, normals.wide, plan.starts, plan.columns, unknowns, nr, out
         )
         return out.T
-    own, eliminated = np.flatnonzero(unknowns < nr), np.flatnonzero(unknowns >= nr)
-    out[own, unknowns[own]] = 1.0
+    reduced_places, eliminated = np.flatnonzero(unknowns < nr), np.flatnonzero(unknowns >= nr)
+    out[reduced_places, unknowns[reduced_places]] = 1.0
+    # A reduced unknown follows itself; an eliminated unknown follows -V^-1 W' = -L^-T Y'.
     block, axis = np.divmod(unknowns[eliminated] - nr, 3)
     first, count = plan.starts[block], np.diff(plan.starts)[block]
+    # Entries of all blocks in one vector: start of each block plus a running number.
     entry = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
     length, place = np.repeat(count, count), np.repeat(2 * first, count) + entry
     change = np.zeros(len(entry))
-    for root in inverse_roots(normals)[block, :, axis].T:  # one for each row of the wide part
+    for root in inverse_roots(normals)[block, :, axis].T:  # each row of the wide part
         change -= np.repeat(root, count) * normals.wide[place]
         place += length
     out[np.repeat(eliminated, count), plan.columns[entry]] = change
@@ -127,9 +184,10 @@ def through_reduced(plan, normals, unknowns):
 
 
 def add_own_cofactors(plan, normals, unknowns, q):
-    """Add V^-1 between those of some unknowns (k,) that belong to one block to q (k, k)."""
+    """Add V^-1 to the cofactors q (k, k) of selected unknowns (k,) that share a block."""
     places = np.flatnonzero(unknowns >= plan.reduced)
     block, axis = np.divmod(unknowns[places] - plan.reduced, 3)
+    # Sorting by block makes the unknowns of a block neighbours, at most two places apart.
     order = np.argsort(block, kind="stable")
     block, axis, places = block[order], axis[order], places[order]
     if is_worth_compiling(plan.rows):
@@ -138,7 +196,7 @@ def add_own_cofactors(plan, normals, unknowns, q):
         return
     root = inverse_roots(normals)
     inverse = root.transpose(0, 2, 1) @ root
-    for shift in range(3):  # pairs that lie 0, 1 or 2 apart once sorted by block
+    for shift in range(3):  # pairs at a distance of 0, 1 or 2 after sorting by block
         i = np.flatnonzero(block[shift:] == block[: len(block) - shift])
         j = i + shift
         value = inverse[block[i], axis[i], axis[j]]
@@ -148,9 +206,23 @@ def add_own_cofactors(plan, normals, unknowns, q):
 
 
 def block_cofactors(plan, normals, inverse):
-    """Cofactors (nb, 3, 3) of all blocks, and (t, 3) of each block with its reduced columns.
+    """Cofactors of all blocks, and of each block with its reduced unknowns.
 
-    inverse  (nr, nr) cofactor matrix of the reduced unknowns, row by row
+    Parameters
+    ----------
+    plan : Plan
+        Structure of the normal equations.
+    normals : Normals
+        Eliminated normal equations.
+    inverse : ndarray, shape (nr, nr)
+        Cofactor matrix of the reduced unknowns, in row order.
+
+    Returns
+    -------
+    cofactors : ndarray, shape (nb, 3, 3)
+        Cofactors of the blocks.
+    cross : ndarray, shape (t + 1, 3)
+        Cofactors of each block with its reduced columns; the last row is spare.
     """
     cross, out = np.empty((len(plan.columns) + 1, 3)), np.empty((plan.blocks, 3, 3))
     cross[-1] = 0.0
@@ -161,19 +233,35 @@ def block_cofactors(plan, normals, inverse):
         )  # fmt: skip
         return out, cross
     root = np.linalg.inv(roots(normals))
+    # With Z = Y L^-1: Q_rb = -S^-1 Z and Q_bb = V^-1 + Z'S^-1 Z.
     for o in range(plan.blocks):
-        here = slice(plan.starts[o], plan.starts[o + 1])
-        z = normals.wide[plan.entries[here]] @ root[o]
-        columns = plan.columns[here]
-        cross[here] = -inverse[np.ix_(columns, columns)] @ z
-        out[o] = root[o].T @ root[o] - z.T @ cross[here]
+        block_entries = slice(plan.starts[o], plan.starts[o + 1])
+        z = normals.wide[plan.entries[block_entries]] @ root[o]
+        columns = plan.columns[block_entries]
+        cross[block_entries] = -inverse[np.ix_(columns, columns)] @ z
+        out[o] = root[o].T @ root[o] - z.T @ cross[block_entries]
     return out, cross
 
 
 def leverage(plan, batch, jac, inverse, cross, cofactors):
-    """J Q J' of each row (n, m): one minus the redundancy number.
+    """Leverage J Q J' of each row: one minus its redundancy number.
 
-    inverse, cross, cofactors  of the reduced unknowns, and as block_cofactors gives them
+    Parameters
+    ----------
+    plan : Plan
+        Structure of the normal equations.
+    batch : Batch
+        Description of the rows.
+    jac : ndarray, shape (n, m, K)
+        Whitened derivatives; with a block, its three derivatives come first.
+    inverse : ndarray, shape (nr, nr)
+        Cofactors of the reduced unknowns.
+    cross, cofactors : ndarray
+        As returned by `block_cofactors`.
+
+    Returns
+    -------
+    ndarray, shape (n, m)
     """
     spare = plan.reduced
     if batch.block is not None and is_worth_compiling(plan.rows):
@@ -183,13 +271,15 @@ def leverage(plan, batch, jac, inverse, cross, cofactors):
             inverse, cross, cofactors, spare, out,
         )  # fmt: skip
         return out
+    # The spare column of fixed unknowns has zero cofactors.
     padded = np.pad(inverse, (0, 1))
     f = jac if batch.block is None else jac[:, :, 3:]
     columns = batch.columns
     q = padded[columns[:, :, None], columns[:, None, :]]
     out = np.einsum("nma,nab,nmb->nm", f, q, f)
+    # F Q_rr F' + E Q_bb E' + 2 E Q_br F'.
     if batch.block is not None:
-        e, mixed = jac[:, :, :3], cross[batch.places]
+        e, cross_cofactors = jac[:, :, :3], cross[batch.places]
         out += np.einsum("nma,nab,nmb->nm", e, cofactors[batch.block], e)
-        out += 2 * np.einsum("nma,nka,nmk->nm", e, mixed, f)
+        out += 2 * np.einsum("nma,nka,nmk->nm", e, cross_cofactors, f)
     return out

@@ -1,4 +1,4 @@
-"""Gauss-Newton on the reduced normal equations; damped only when the cost rises."""
+"""Gauss-Newton iteration on the reduced normal equations, damped only if the cost rises."""
 
 import numpy as np
 import scipy.linalg
@@ -14,51 +14,32 @@ from tankcal.solver.rank import diagnosis, weakness
 from tankcal.solver.rows import Rows
 from tankcal.solver.threads import threads_for
 
-SMALL = 2e7  # rows times unknowns squared: below it a system without blocks is solved by QR
-FIRST_DAMPING = 1e-4
-STRONGEST_DAMPING = 1e12
-NEARLY_THERE = 1e-2  # of the cost, still to be gained: from here on undamped
-SHARP = 1e-13  # of the rows, gained by the last step: below it derivatives need no renewal
+SMALL = 2e7  # rows times unknowns squared, below which a system without blocks is solved by QR
+FIRST_DAMPING = 1e-4  # relative to the unit diagonal of the scaled normal equations
+STRONGEST_DAMPING = 1e12  # damping at which the iteration stops without a minimum
+NEARLY_THERE = 1e-2  # expected relative reduction of the cost below which damping ends
+SHARP = 1e-13  # decrement per row below which the derivatives are not evaluated again
 
 
 class UndeterminedError(SolutionError):
-    """Some unknowns are not determined by the observations."""
+    """Unknowns that the observations do not determine."""
 
 
 def solve(model, state, *, max_iterations=100, tolerance=1e-4):
-    """Minimise the sum of squared rows of a Model, starting from `state`.
-
-    Parameters
-    ----------
-    tolerance : optional
-        Of the last step: root of the sum of squares of what it changes in the rows, per root of the
-        number of rows; the step itself is taken, so the error left is far smaller.
-
-    Returns
-    -------
-    Adjustment
-
-    Raises
-    ------
-    SolutionError
-        When the observations do not determine the unknowns (the message names them) or when the
-        iteration does not converge.
-    """
-    with threads_for(model.reduced):
-        return _solved(_Work(model), state, max_iterations, tolerance)
-
-
-def linearise(model, state):
-    """The Adjustment of a Model with its derivatives at `state`: no step is made.
-
-    Its cofactors are those of a survey whose observations are what `state` computes, so it tells
-    how well the unknowns will be known before anything is measured.
+    """Minimise the sum of squared rows of a Model.
 
     Parameters
     ----------
     model : Model
+        The least-squares problem.
     state : object
-        Values of all unknowns, as the model's groups understand them.
+        Start values of all unknowns, in the form used by the groups of the model.
+    max_iterations : int, optional
+        Largest number of iterations.
+    tolerance : float, optional
+        Limit for the last step: root of the sum of squared changes of the rows, divided by the root
+        of the number of rows. The last step is applied, so that the remaining error is much
+        smaller.
 
     Returns
     -------
@@ -67,45 +48,97 @@ def linearise(model, state):
     Raises
     ------
     SolutionError
-        When the observations do not determine the unknowns (the message names them).
+        If the observations do not determine the unknowns (the message names them), or if the
+        iteration does not converge.
+
+    Examples
+    --------
+    The mean of two observations with a standard uncertainty of 1:
+
+    >>> import numpy as np
+    >>> from tankcal.solver import Group, Model
+    >>> def fill(x, w, jac):
+    ...     w[:, 0] = x[0] - np.array([1.0, 3.0])
+    ...     if len(jac):
+    ...         jac[:] = 1.0
+    >>> model = Model(1, 0, (Group(np.array([[0], [0]]), 1, fill),), lambda x, step: x + step)
+    >>> result = solve(model, np.zeros(1))
+    >>> result.unknowns.round(9).tolist(), result.dof
+    ([2.0], 1)
     """
     with threads_for(model.reduced):
-        work = _Work(model)
+        return _iterate(_Solution(model), state, max_iterations, tolerance)
+
+
+def linearise(model, state):
+    """Adjustment of a Model with derivatives at a given state, without a step.
+
+    Parameters
+    ----------
+    model : Model
+        The least-squares problem.
+    state : object
+        Values of all unknowns, in the form used by the groups of the model.
+
+    Returns
+    -------
+    Adjustment
+
+    Raises
+    ------
+    SolutionError
+        If the observations do not determine the unknowns (the message names them).
+
+    Notes
+    -----
+    The cofactors are valid for a survey whose observations agree with the state. They predict the
+    uncertainty of the unknowns before any measurement.
+    """
+    with threads_for(model.reduced):
+        work = _Solution(model)
         cost, factor = work.rows.add(state), work.sound_factor(state)
         _refuse_untouched(model, factor)
         return work.adjustment(state, cost, 0, factor)
 
 
-def _solved(work, state, max_iterations, tolerance):
-    """The iteration of `solve`."""
+def _iterate(work, state, max_iterations, tolerance):
+    """Run the iteration of `solve`."""
     model, rows, state = work.model, work.rows, work.closed_start(state)
     cost = rows.add(state)
     damping, resting = 0.0, FIRST_DAMPING
+    # The decrement is a sum of squares over all rows.
     limit = tolerance**2 * max(rows.count, 1)
     for iteration in range(1, max_iterations + 1):
         factor, candidate = work.factor(state, damping), None
         if factor is not None:
             step, decrement = work.step(factor)
             candidate = work.closed(model.moved(state, step), factor)
+        # No factor, or the exact conditions cannot be closed: add the rows again and damp more.
         if candidate is None:
-            cost, damping = rows.add(state), _stronger(damping, resting)
+            cost, damping = rows.add(state), _increase_damping(damping, resting)
             continue
+        # Converged. Only an undamped step is a Gauss-Newton step, whose decrement measures the
+        # distance from the minimum.
         if not damping and decrement < limit:
             _refuse_untouched(model, factor)
+            # The step is so small that the present factor is also valid at the minimum.
             if decrement < SHARP * max(rows.count, 1):
                 return work.adjustment(candidate, rows.evaluate(candidate), iteration, factor)
             cost = rows.add(candidate)
             return work.adjustment(candidate, cost, iteration, work.sound_factor(candidate))
-        before, most = cost, cost * (1 + 1e-12)
+        # Rounding must not count as a rise of the cost.
+        previous_cost, most = cost, cost * (1 + 1e-12)
         cost = rows.add(candidate, most)
         if cost <= most:
-            gain = 2 * (before - cost) / decrement
+            # Ratio of actual to predicted reduction; a high ratio reduces the damping.
+            gain = 2 * (previous_cost - cost) / decrement
             damping *= max(1 / 3, 1 - (2 * gain - 1) ** 3)
+            # Close to the minimum, undamped steps converge faster.
             if damping and decrement < NEARLY_THERE * cost:
                 damping, resting = 0.0, damping
             state = candidate
         else:
-            cost, damping = rows.add(state), _stronger(damping, resting)
+            cost, damping = rows.add(state), _increase_damping(damping, resting)
     raise SolutionError(
         message(
             "not_converged",
@@ -117,6 +150,7 @@ def _solved(work, state, max_iterations, tolerance):
 
 
 def _refuse_untouched(model, factor):
+    """Raise UndeterminedError if an unknown occurs in no row."""
     if len(factor.untouched):
         names = ", ".join(model.name_of(int(column)) for column in factor.untouched)
         raise UndeterminedError(
@@ -124,7 +158,8 @@ def _refuse_untouched(model, factor):
         )
 
 
-def _stronger(damping, resting):
+def _increase_damping(damping, resting):
+    """Increase the damping tenfold, starting from `resting`; raise SolutionError at the limit."""
     damping = 10 * damping or resting
     if damping > STRONGEST_DAMPING:
         raise SolutionError(
@@ -133,8 +168,8 @@ def _stronger(damping, resting):
     return damping
 
 
-class _Work:
-    """Rows, plan and exact conditions of one solve."""
+class _Solution:
+    """Rows, plan and exact conditions during a solution."""
 
     def __init__(self, model):
         self.model, self.rows = model, Rows(model)
@@ -142,22 +177,23 @@ class _Work:
         self.conditions = Conditions(model)
 
     def closed_start(self, state):
-        """The start state, brought to where the exact conditions hold."""
+        """Move the start state to the nearest state that meets the exact conditions."""
         if not self.conditions:
             return state
         lengths = np.zeros(self.model.unknowns + 1)
         for group, jac in zip(self.model.groups, self.rows.derivatives(state), strict=True):
             np.add.at(lengths, group.columns, np.einsum("nmk,nmk->nk", jac, jac))
         lengths = lengths[: self.plan.reduced]
+        # Lengths of the columns define the distance in which the nearest state is sought.
         scale = 1.0 / np.sqrt(np.where(lengths > 0, lengths, 1.0))
         return self.conditions.closed(state, scale, strict=True)
 
     def closed(self, state, factor):
-        """The state after a step, brought back to the exact conditions; None: damp more."""
+        """Restore the exact conditions after a step; None requires more damping."""
         return self.conditions.closed(state, factor.scale) if self.conditions else state
 
     def adjustment(self, state, cost, iterations, factor):
-        """The Adjustment at a minimum; factor  that of its normal equations."""
+        """Assemble the Adjustment at a minimum from its factored normal equations."""
         return Adjustment(
             unknowns=state,
             cofactor=Cofactors(self, state, factor),
@@ -170,7 +206,13 @@ class _Work:
         )
 
     def sound_factor(self, state):
-        """The Factor of the rows just added; a SolutionError when there is none."""
+        """Factor of the rows just added, without damping.
+
+        Raises
+        ------
+        SolutionError
+            If the normal equations cannot be factored.
+        """
         factor = self.factor(state, 0.0)
         if factor is None:
             raise SolutionError(
@@ -183,23 +225,28 @@ class _Work:
         return factor
 
     def factor(self, state, damping):
-        """Normal equations of the rows just added, eliminated, factored; None: damp more."""
+        """Eliminate and factor the normal equations just added; None requires more damping."""
         normals, nr = self.normals, self.plan.reduced
         diagonal = normals.t.diagonal()[:nr].copy()
         if not np.isfinite(diagonal).all():
-            return None  # no derivative exists at this state
+            return None  # the derivatives are not finite at this state
+        # An unknown without rows gets a unit diagonal, so that the system can be factored; it is
+        # reported later.
         untouched = diagonal == 0.0
         if untouched.any():
             diagonal[untouched] = 1.0
+        # An unknown that occurs only in a condition is determined by this condition.
         tangent = None
         if self.conditions:
             tangent = self.conditions.tangent(state, 1.0 / np.sqrt(diagonal))
             untouched &= ~tangent.touched
-        bad = eliminate(self.plan, normals, damping, SMALLEST_PIVOT)
-        if bad >= 0:
-            return self._look(state, damping, bad)
+        undetermined_block = eliminate(self.plan, normals, damping, SMALLEST_PIVOT)
+        if undetermined_block >= 0:
+            return self._raise_if_undetermined(state, damping, undetermined_block)
         scale = 1.0 / np.sqrt(diagonal)
-        null_space = datum_basis = held = None
+        null_space = datum_basis = datum_rows = None
+        # A free network: the null space is fixed by adding rows with full weight. Damping makes
+        # these rows unnecessary.
         if self.model.null_space is not None and not damping:
             null_space = self.model.null_space(state)
             datum_basis = null_space * self.model.inner[:, None]
@@ -209,47 +256,56 @@ class _Work:
                         "datum_not_fixed", "the coordinates chosen to hold the datum do not fix it"
                     )
                 )
-            held = np.linalg.qr(null_space[:nr] / scale[:, None])[0]
+            datum_rows = np.linalg.qr(null_space[:nr] / scale[:, None])[0]
+        # QR of small systems does not square the condition number.
         if self.plan.blocks == 0 and self.rows.count * nr * nr < SMALL:
-            lower, sound, reaction_part = self._dense_root(scale, untouched, damping, held, tangent)
+            lower, is_regular, reaction_part = self._factor_by_qr(
+                scale, untouched, damping, datum_rows, tangent
+            )
         else:
-            lower, sound, reaction_part = self._root(scale, untouched, damping, held, tangent)
-        if not sound:
-            return self._look(state, damping, None)
+            lower, is_regular, reaction_part = self._factor_by_cholesky(
+                scale, untouched, damping, datum_rows, tangent
+            )
+        if not is_regular:
+            return self._raise_if_undetermined(state, damping, None)
         untouched = untouched.nonzero()[0]
         return Factor(
             normals, scale, lower, untouched, null_space, datum_basis, tangent, reaction_part
         )
 
-    def _root(self, scale, untouched, damping, held, tangent):
-        """Cholesky factor of the scaled reduced system, and whether its pivots are sound.
+    def _factor_by_cholesky(self, scale, untouched, damping, datum_rows, tangent):
+        """Cholesky factor of the scaled reduced system.
 
-        And what the conditions hold against: see Tangent.square.
+        Returns the factor, whether its pivots exceed rounding, and the reaction part of the exact
+        conditions, see Tangent.square.
         """
         nr = self.plan.reduced
-        s = self.normals.t[:nr, :nr] * scale  # its upper half
+        s = self.normals.t[:nr, :nr] * scale  # upper half
         s *= scale[:, None]
+        # A view of the diagonal.
         corner = np.einsum("ii->i", s)
         corner[untouched] = 1.0
         corner += damping
-        if held is not None:
-            s += held @ held.T
+        # S + N N' is regular, and gives equal results after the datum transformation.
+        if datum_rows is not None:
+            s += datum_rows @ datum_rows.T
         reaction_part = None
         if tangent is not None:
             s, reaction_part = tangent.square(np.triu(s) + np.triu(s, 1).T)
         lower, info = scipy.linalg.lapack.dpotrf(s.T, lower=1, clean=0, overwrite_a=1)
-        sound = (
+        is_regular = (
             not info and find_determined(lower.diagonal(), self.rows.count, of_normals=True).all()
         )
-        return lower, sound, reaction_part
+        return lower, is_regular, reaction_part
 
-    def _dense_root(self, scale, untouched, damping, held, tangent):
-        """The same factor by QR of the rows themselves: nothing is squared."""
+    def _factor_by_qr(self, scale, untouched, damping, datum_rows, tangent):
+        """Factor like `_factor_by_cholesky`, but from the rows, without normal equations."""
         nr = self.plan.reduced
+        # Rows for unknowns without observations, for the damping and for the datum.
         rows = [np.diag(untouched.astype(float)), np.sqrt(damping) * np.eye(nr)]
-        if held is not None:
-            rows.append(held.T)
-        for part in self.rows.parts:  # without blocks a group is one part
+        if datum_rows is not None:
+            rows.append(datum_rows.T)
+        for part in self.rows.parts:  # without blocks, each group is a single part
             for batch in part.batches:
                 jac = batch.of(part.jac)
                 n, m, _ = jac.shape
@@ -262,22 +318,24 @@ class _Work:
             outer, rows = tangent.split(rows.T)
             reaction_part, rows = outer @ np.vstack([outer, rows]).T, rows.T
         r = np.linalg.qr(rows, mode="r")
+        # R' with positive pivots is the Cholesky factor of the normal equations.
         lower = np.asfortranarray((r * np.sign(r.diagonal())[:, None]).T)
         return lower, find_determined(lower.diagonal(), self.rows.count).all(), reaction_part
 
-    def _look(self, state, damping, bad_block):
-        """A factor that could not be had: raise when it is the survey's fault."""
-        found = None if damping else diagnosis(self, state, bad_block)
-        if found:
-            raise UndeterminedError(found)
+    def _raise_if_undetermined(self, state, damping, bad_block):
+        """Raise UndeterminedError if an undamped factorisation failed for lack of observations."""
+        reason = None if damping else diagnosis(self, state, bad_block)
+        if reason:
+            raise UndeterminedError(reason)
 
     def step(self, factor):
-        """Gauss-Newton step (unknowns,) and the squared size of what it changes in the rows."""
+        """Gauss-Newton step (unknowns,), and the squared norm of its effect on the rows."""
         n = factor.normals
         reduced = -factor.solved(n.g[:-1])
         blocks = -back_substitute(self.plan, n, reduced)
         step = np.concatenate([reduced, blocks.ravel()])
         if factor.null_space is not None:
             step = s_transform(step, factor.null_space, factor.datum_basis)
+        # g'S^-1 g + y'y: the reduction of the sum of squares predicted by the linear model.
         decrement = -float(n.g[:-1] @ reduced) + float(np.vdot(n.b, n.b))
         return step, decrement

@@ -1,10 +1,10 @@
-"""What a problem hands to the solver, and what stays the same in all iterations of it.
+"""Description of a problem for the solver, and the structure shared by all iterations.
 
-The unknowns are numbered so that the reduced ones come first and the eliminated blocks, three
-unknowns each, come last. No row touches two blocks. For each block the plan keeps the sorted list
-of reduced columns that occur together with it: its part of the normal matrix is stored for these
-columns only, in three rows, one an unknown of the block ("wide"). Neighbouring blocks whose columns
-are nearly the same are given those of each other, too, so that they are eliminated together.
+The reduced unknowns come first. The eliminated blocks, with three unknowns each, come last. No row
+depends on two blocks. For each block, the plan stores the sorted list of reduced columns that occur
+together with the block. The block's part of the normal matrix is stored for these columns only, in
+three rows, one for each unknown of the block ("wide"). Neighbouring blocks with nearly equal
+columns receive the union of their columns, so that they are eliminated together.
 """
 
 from collections.abc import Callable
@@ -19,19 +19,21 @@ from tankcal.solver.compiled import compile_functions, is_worth_compiling
 
 @dataclass(frozen=True)
 class Group:
-    """Observations of one kind, n of them with m rows each; every row is one whitened equation.
+    """Observations of one kind: n observations with m rows each, every row a whitened equation.
 
     Attributes
     ----------
-    columns : ndarray, shape (n, K)
-        Unknown of each derivative, -1 where that one is fixed.
+    columns : ndarray of int, shape (n, K)
+        Unknown of each derivative, -1 for a fixed unknown.
     rows : int
-        m.
+        Number m of rows of an observation.
     fill : callable
-        fill(state, w, jac) writes misclosures (computed minus observed, over the sd) into w (n, m)
-        and derivatives into jac (n, m, K); a jac of length 0 is left out.
-    part : callable
-        part(slice) -> what fills these observations alone; None: they are always filled together.
+        fill(state, w, jac) writes the misclosures (computed minus observed, divided by the standard
+        deviation) into w (n, m) and the derivatives into jac (n, m, K). A jac of length 0 is not
+        filled.
+    part : callable, optional
+        part(slice) -> a `fill` for these observations only. None: the observations are always
+        evaluated together.
     """
 
     columns: np.ndarray
@@ -42,7 +44,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Model:
-    """A least-squares problem: minimise the sum of squares of all rows.
+    """Least-squares problem: minimise the sum of squares of all rows.
 
     Attributes
     ----------
@@ -50,25 +52,24 @@ class Model:
         Number of unknowns of the reduced system; they come first.
     blocks : int
         Number of eliminated blocks of three unknowns; they come last.
-    groups : tuple
-        Tuple of Group; no row touches two eliminated blocks.
+    groups : tuple of Group
+        Observations; no row depends on two eliminated blocks.
     moved : callable
-        moved(state, step) -> state, step (reduced + 3 blocks,).
-    null_space : callable
-        null_space(state) -> (unknowns, d) directions in which nothing is observed (a datum to be
-        chosen), or None when the observations give the datum.
+        moved(state, step) -> the new state, for a step (reduced + 3 blocks,).
+    null_space : callable, optional
+        null_space(state) -> directions (unknowns, d) in which the observations contain no
+        information and a datum is chosen. None: the observations determine the datum.
     name_of : callable
-        name_of(column) -> what the user calls that unknown.
-    in_words : callable
-        in_words(directions) -> the unknowns that take part in directions (unknowns, d), all columns
-        of length one, in words; None: their names.
+        name_of(column) -> name of the unknown for the user.
+    in_words : callable, optional
+        in_words(directions) -> description of the unknowns in directions (unknowns, d), given for
+        columns of length one. None: their names.
     inner : ndarray, shape (unknowns,)
-        1 where an unknown takes part in the inner constraints that choose the datum of the free
-        directions, else 0.
-    exact : tuple
-        Tuple of Group: rows that are zero exactly, between reduced unknowns only.
+        1 for an unknown in the inner constraints that define the datum, else 0.
+    exact : tuple of Group
+        Rows that are exactly zero, between reduced unknowns only.
     name_of_exact : callable
-        name_of_exact(row) -> what the user calls that row, all rows of `exact` counted.
+        name_of_exact(row) -> name of a row of `exact` for the user, counted over all groups.
     """
 
     reduced: int
@@ -83,7 +84,7 @@ class Model:
     name_of_exact: Callable = str
 
     def in_datum(self, state, step):
-        """A step (unknowns,) without what the inner constraints forbid; there may be none."""
+        """Project a step (unknowns,) onto the inner constraints, if any."""
         if self.null_space is None:
             return step
         null_space = self.null_space(state)
@@ -96,16 +97,53 @@ class Model:
 
 
 def s_transform(change, null_space, datum_basis):
-    """A change (unknowns,) or (unknowns, k) brought into the datum: datum_basis' change = 0."""
+    """Transform changes of the unknowns to a datum (S-transformation).
+
+    Parameters
+    ----------
+    change : ndarray, shape (unknowns,) or (unknowns, k)
+        Changes in any datum.
+    null_space : ndarray, shape (unknowns, d)
+        Directions G that only the datum fixes.
+    datum_basis : ndarray, shape (unknowns, d)
+        Inner constraints C: C' change = 0 in the new datum.
+
+    Returns
+    -------
+    ndarray, shape of `change`
+
+    Notes
+    -----
+    change - G (C'G)^-1 C' change.
+
+    Examples
+    --------
+    Three heights, of which only differences are observed, with the mean as datum:
+
+    >>> ones = np.ones((3, 1))
+    >>> s_transform(np.array([0.0, 1.0, 5.0]), ones, ones).tolist()
+    [-2.0, -1.0, 3.0]
+    """
+    # Removes the component in the null space that violates C' change = 0.
     return change - null_space @ np.linalg.solve(datum_basis.T @ null_space, datum_basis.T @ change)
 
 
 @dataclass
 class Normals:
-    """Normal equations while they are built and eliminated (see tankcal.solver.loops).
+    """Normal equations during assembly and elimination, see tankcal.solver.loops.
 
-    v (nb, 6), b (nb, 3), wide (3 t + 1,), t (nr + 1, nr + 1), g (nr + 1,)
-    wide of each block is three rows, one a unknown of it; see Plan.entries
+    Attributes
+    ----------
+    v : ndarray, shape (nb, 6)
+        Lower half of each block V, later of L.
+    b : ndarray, shape (nb, 3)
+        Right-hand side of each block.
+    wide : ndarray, shape (3 t + 1,)
+        Wide part: three rows for each block, see Plan.entries; the last element is spare.
+    t : ndarray, shape (nr + 1, nr + 1)
+        Upper half of the reduced matrix; the last row and column are spare.
+    g : ndarray, shape (nr + 1,)
+        Right-hand side of the reduced system; the last element is spare.
     """
 
     v: np.ndarray
@@ -116,7 +154,7 @@ class Normals:
 
     @classmethod
     def empty(cls, plan):
-        """Room for them, to be cleared before anything is added."""
+        """Allocate normal equations without clearing them."""
         return cls(
             np.empty((plan.blocks, 6)),
             np.empty((plan.blocks, 3)),
@@ -126,24 +164,34 @@ class Normals:
         )
 
     def clear(self):
-        """Start again without asking for memory; of the wide part the spare number alone."""
+        """Set the normal equations to zero; of the wide part, only the spare element."""
         for array in (self.v, self.b, self.t, self.g, self.wide[-1:]):
             array.fill(0.0)
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Rows of one group that are treated alike.
+    """Rows of one group with a common layout.
 
-    The reduced columns of a row come in runs of neighbours, cut alike in all rows.
+    The reduced columns of a row consist of runs of neighbours, with equal cuts in all rows.
 
-    group  number of the group
-    rows   which observations of the group: a slice, or (n,)
-    order  (n, K) place in the group's derivatives of each of this batch's, or None (as they are)
-    block  (n,) block whose derivatives come first, or None
-    cuts   (s + 1,) where the runs begin among the k further derivatives; and k at the end
-    first  (n, s) column of the first of each run; a fixed unknown is a run, in the spare column
-    place  (n, s) where that column and the block meet in the wide part; a spare place for the fixed
+    Attributes
+    ----------
+    group : int
+        Index of the group.
+    rows : slice or ndarray of int, shape (n,)
+        Observations of the group.
+    order : ndarray of int, shape (n, K), or None
+        Index of each derivative of the batch within the derivatives of the group; None: equal
+        order.
+    block : ndarray of int, shape (n,), or None
+        Block whose derivatives come first.
+    cuts : ndarray of int, shape (s + 1,)
+        Begin of each run among the k further derivatives, and k.
+    first : ndarray of int, shape (n, s)
+        First column of each run; a fixed unknown is a run in the spare column.
+    place : ndarray of int, shape (n, s), or None
+        Place of this column and of the block in the wide part; the spare place for a fixed unknown.
     """
 
     group: int
@@ -156,54 +204,82 @@ class Batch:
 
     @property
     def columns(self):
-        """(n, k) reduced column of each further derivative."""
+        """Reduced column (n, k) of each further derivative."""
         return self._spread(self.first)
 
     @property
     def places(self):
-        """(n, k) where each column and the block meet in the wide part."""
+        """Place (n, k) of each column and of the block in the wide part."""
         return self._spread(self.place)
 
     def _spread(self, first):
+        """Expand values (n, s) for the first columns of the runs to all columns (n, k)."""
         lengths = np.diff(self.cuts)
-        within = np.arange(self.cuts[-1]) - np.repeat(self.cuts[:-1], lengths)
-        return np.repeat(first, lengths, axis=1) + within
+        # Number of each column within its run: 0, 1, 2, ...
+        offsets = np.arange(self.cuts[-1]) - np.repeat(self.cuts[:-1], lengths)
+        return np.repeat(first, lengths, axis=1) + offsets
 
     def of(self, array):
-        """This batch's part of an array (n, m) of misclosures or (n, m, K) of derivatives."""
+        """Part of an array (n, m) of misclosures or (n, m, K) of derivatives in this batch."""
         part = array[self.rows]
         if self.order is not None and part.ndim == 3:
             part = np.take_along_axis(part, self.order[:, None, :], axis=2)
         return part
 
     def taken(self, rows, count):
-        """Which of the rows (k,) of its group, which has `count`, are in it; and a Batch of these.
+        """Select rows of the group that belong to this batch.
 
-        That Batch has its rows one after the other, in the order given.
+        Parameters
+        ----------
+        rows : ndarray of int, shape (k,)
+            Rows of the group.
+        count : int
+            Number of rows of the group.
+
+        Returns
+        -------
+        members : ndarray of bool, shape (k,)
+            True for a row of this batch.
+        subset : Batch
+            Batch of these rows, one after the other, in the given order.
         """
-        own = np.arange(count)[self.rows]
-        place = np.searchsorted(own, rows)
-        inside = np.append(own, count)[place] == rows
-        place = place[inside]
-        order, block, of_wide = (
-            None if one is None else one[place] for one in (self.order, self.block, self.place)
+        numbers = np.arange(count)[self.rows]
+        # The rows of a batch are ascending, so that a binary search finds them.
+        place = np.searchsorted(numbers, rows)
+        members = np.append(numbers, count)[place] == rows
+        place = place[members]
+        order, block, wide_place = (
+            None if array is None else array[place]
+            for array in (self.order, self.block, self.place)
         )
-        alone = Batch(self.group, slice(None), order, block, self.cuts, self.first[place], of_wide)
-        return inside, alone
+        subset = Batch(
+            self.group, slice(None), order, block, self.cuts, self.first[place], wide_place
+        )
+        return members, subset
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Structure of the normal equations: nr reduced unknowns, nb blocks of three.
+    """Structure of the normal equations: nr reduced unknowns and nb blocks of three unknowns.
 
-    reduced, blocks   nr, nb
-    rows              observations of the largest group
-    batches           tuple of Batch
-    starts            (nb + 1,) where each block's reduced columns start in `columns`
-    columns           (t,) reduced columns of all blocks, ascending in each
-    ends              (s + 1,) where in `columns` runs of neighbouring columns begin, t at the end
-    runs              (nb + 1,) where in `ends` each block begins
-    alike             where series of blocks with the same columns begin, see series; nb at the end
+    Attributes
+    ----------
+    reduced, blocks : int
+        nr and nb.
+    batches : tuple of Batch
+        The rows.
+    starts : ndarray of int, shape (nb + 1,)
+        Begin of the reduced columns of each block in `columns`.
+    columns : ndarray of int, shape (t,)
+        Reduced columns of all blocks, ascending for each block.
+    ends : ndarray of int, shape (s + 1,)
+        Begin of each run of neighbouring columns in `columns`, and t.
+    runs : ndarray of int, shape (nb + 1,)
+        Begin of each block in `ends`.
+    alike : ndarray of int
+        Begin of each series of blocks with equal columns, see tankcal.solver.series, and nb.
+    rows : int
+        Number of observations of the largest group.
     """
 
     reduced: int
@@ -218,110 +294,141 @@ class Plan:
 
     @cached_property
     def entries(self):
-        """(t + 1, 3) where in the wide part each of `columns` meets its block; a spare place."""
+        """Places (t + 1, 3) of each of `columns` in the wide part, for the three rows of its block.
+
+        The last row contains the spare place.
+        """
         length = np.diff(self.starts)
+        # The blocks before it occupy three rows each: 3 starts + (index - starts).
         first = 2 * np.repeat(self.starts[:-1], length) + np.arange(len(self.columns))
-        found = first[:, None] + np.repeat(length, length)[:, None] * np.arange(3)
-        return np.append(found, np.full((1, 3), 3 * len(self.columns)), axis=0)
+        places = first[:, None] + np.repeat(length, length)[:, None] * np.arange(3)
+        return np.append(places, np.full((1, 3), 3 * len(self.columns)), axis=0)
 
 
 def plan(reduced, blocks, groups):
-    """The Plan of groups of observations (see tankcal.solver.Group)."""
-    raw = []
+    """Plan of the normal equations for groups of observations.
+
+    Parameters
+    ----------
+    reduced : int
+        Number of reduced unknowns.
+    blocks : int
+        Number of eliminated blocks.
+    groups : sequence of Group
+        Observations.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    ValueError
+        If a row depends on two blocks or on a part of a block.
+    """
+    parts = []
     for g, group in enumerate(groups):
-        for rows, order, block, columns in _split(group.columns, reduced, blocks):
-            cuts = _cuts(columns, reduced)
+        for rows, order, block, columns in _split_group(group.columns, reduced, blocks):
+            # All rows of a batch share their cuts, so that loops run over the runs and not over the
+            # columns.
+            cuts = _find_cuts(columns, reduced)
             first = np.ascontiguousarray(columns[:, cuts[:-1]], dtype=np.int32)
-            raw.append((g, rows, order, block, cuts, first))
+            parts.append((g, rows, order, block, cuts, first))
     rows = max((len(group.columns) for group in groups), default=0)
     structure = _structure_by_loops if is_worth_compiling(rows) else _structure
-    starts, columns, ends, alike, places = structure(reduced, blocks, raw)
-    batches = tuple(Batch(*fields, place) for fields, place in zip(raw, places, strict=True))
+    starts, columns, ends, alike, places = structure(reduced, blocks, parts)
+    batches = tuple(Batch(*fields, place) for fields, place in zip(parts, places, strict=True))
     runs = np.searchsorted(ends, starts)
     return Plan(reduced, blocks, batches, starts, columns, ends, runs, alike, rows)
 
 
-def _structure(reduced, blocks, raw):
-    """starts, columns, ends, alike of a Plan, and the places of each Batch."""
-    together = np.zeros((blocks, reduced + 1), dtype=bool)
-    for _, _, _, block, cuts, first in raw:
+def _structure(reduced, blocks, parts):
+    """starts, columns, ends and alike of a Plan, and the places of each Batch."""
+    # Mark the reduced columns that occur together with each block.
+    occurrence = np.zeros((blocks, reduced + 1), dtype=bool)
+    for _, _, _, block, cuts, first in parts:
         if block is not None:
-            _mark(together, block, cuts, first)
-    together[:, reduced] = False
-    changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
+            _mark_columns(occurrence, block, cuts, first)
+    occurrence[:, reduced] = False
+    # Neighbouring blocks with equal columns form a series; series are joined where this saves work.
+    changes = np.flatnonzero((occurrence[1:] != occurrence[:-1]).any(axis=1)) + 1
     alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
-    alike = series._join_series(together, alike, np.ones(reduced + 1, dtype=np.int64))
-    met = np.flatnonzero(together)
+    alike = series._join_series(occurrence, alike, np.ones(reduced + 1, dtype=np.int64))
+    # Row-major positions of the marks, from which owner and column follow by division.
+    met = np.flatnonzero(occurrence)
     starts = np.searchsorted(met, np.arange(blocks + 1) * (reduced + 1))
     owner = np.repeat(np.arange(blocks, dtype=np.int32), np.diff(starts))
     columns = (met - owner * np.int64(reduced + 1)).astype(np.int32)
+    # Place of each marked pair of block and column; unmarked pairs have the spare place.
     place = np.full((blocks, reduced + 1), len(met), dtype=np.int32)
     place.ravel()[met] = np.arange(len(met), dtype=np.int32)
-    places = [None if one[3] is None else place[one[3][:, None], one[-1]] for one in raw]
+    places = [None if item[3] is None else place[item[3][:, None], item[-1]] for item in parts]
     ends = np.flatnonzero(np.diff(met, prepend=-2, append=-2) != 1)
     return starts, columns, ends, alike, places
 
 
-def _mark(together, block, cuts, first):
-    """Mark (blocks, columns) where rows with a block have columns: first (n, s) of runs."""
+def _mark_columns(occurrence, block, cuts, first):
+    """Mark (blocks, columns) where rows with a block have columns; first (n, s) of the runs."""
     for run, length in enumerate(np.diff(cuts)):
-        mine = np.zeros_like(together)
-        mine[block, first[:, run]] = True
+        marks = np.zeros_like(occurrence)
+        marks[block, first[:, run]] = True
         reach = 1
-        while reach < length:  # each mark spreads to as many neighbours as the run has
-            more = min(reach, length - reach)
-            mine[:, more:] |= mine[:, :-more]
-            reach += more
-        together |= mine
+        while reach < length:  # doubles the marked width until the run is complete
+            width = min(reach, length - reach)
+            marks[:, width:] |= marks[:, :-width]
+            reach += width
+        occurrence |= marks
 
 
-def _structure_by_loops(reduced, blocks, raw):
-    """The same by compiled loops."""
-    run = compile_functions(series, series.COMPILED)
-    edges = _edges(reduced, raw)
+def _structure_by_loops(reduced, blocks, parts):
+    """Compute the result of _structure by compiled loops."""
+    loops = compile_functions(series, series.COMPILED)
+    edges = _find_edges(reduced, parts)
+    # Columns that always occur together form a piece, which shortens the marks.
     widths = edges[1:] - edges[:-1]
     piece_of = np.arange(len(widths)).repeat(widths)
-    together = np.zeros((blocks, len(widths)), dtype=bool)
-    for _, _, _, block, cuts, first in raw:
+    occurrence = np.zeros((blocks, len(widths)), dtype=bool)
+    for _, _, _, block, cuts, first in parts:
         if block is not None:
-            run._mark(block, first, cuts, piece_of, together)
-    together[:, -1] = False  # the spare column
-    alike = run._join_series(together, run._list_series(together), widths)
+            loops._mark(block, first, cuts, piece_of, occurrence)
+    occurrence[:, -1] = False  # the spare column
+    alike = loops._join_series(occurrence, loops._list_series(occurrence), widths)
     starts = np.zeros(blocks + 1, dtype=int)
-    columns, ends = run._list_columns(together, edges, alike, starts)
+    columns, ends = loops._list_columns(occurrence, edges, alike, starts)
     places = []
-    for _, _, _, block, _, first in raw:
+    for _, _, _, block, _, first in parts:
         place = None if block is None else np.empty(first.shape, dtype=np.int32)
         if block is not None:
-            run._find_places(block, first, reduced, starts, columns, place)
+            loops._find_places(block, first, reduced, starts, columns, place)
         places.append(place)
     return starts, columns, ends, alike, places
 
 
-def _edges(reduced, raw):
-    """Where pieces of columns begin that rows with a block have together; the spare one is last."""
+def _find_edges(reduced, parts):
+    """First columns of the pieces that rows with a block share; the spare column comes last."""
     begins = np.zeros(reduced + 2, dtype=bool)
     begins[[0, reduced, reduced + 1]] = True
-    for _, _, _, block, cuts, first in raw:
+    for _, _, _, block, cuts, first in parts:
         if block is not None:
+            # A piece begins at the first column of each run and after its last column.
             begins[first] = True
             begins[first + (cuts[1:] - cuts[:-1])] = True
     return begins.nonzero()[0]
 
 
-AT_ONCE = 50_000  # rows whose columns are compared at a time
+AT_ONCE = 50_000  # rows compared at a time
 
 
-def _cuts(columns, spare):
-    """Where runs begin: places at which some row's column is not the one after its neighbour."""
+def _find_cuts(columns, spare):
+    """Begins of the runs: places where the column of a row does not follow its left neighbour."""
     n, k = columns.shape
     if k == 0 or n == 0:
         return np.arange(k + 1)
     begins = np.zeros(k + 1, dtype=bool)
     begins[0] = begins[k] = True
     if is_worth_compiling(n):
-        run = compile_functions(series, series.COMPILED)
-        run._find_breaks(np.ascontiguousarray(columns), spare, begins)
+        loops = compile_functions(series, series.COMPILED)
+        loops._find_breaks(np.ascontiguousarray(columns), spare, begins)
     else:
         for start in range(0, n, AT_ONCE):
             part = columns[start : start + AT_ONCE]
@@ -329,9 +436,10 @@ def _cuts(columns, spare):
     return begins.nonzero()[0]
 
 
-def _split(columns, reduced, blocks):
-    """The rows of a group with a block and those without, the block's derivatives first."""
+def _split_group(columns, reduced, blocks):
+    """Split the rows of a group into rows without and with a block, the block first."""
     spare = columns
+    # A fixed unknown gets the spare column.
     if (columns < 0).any():
         spare = np.where(columns < 0, reduced, columns)
     if blocks == 0 or columns.size == 0:
@@ -339,21 +447,30 @@ def _split(columns, reduced, blocks):
     eliminated = columns >= reduced
     if eliminated.shape[1] >= 3 and not eliminated[:, 3:].any():
         with_block = np.count_nonzero(eliminated[:, 0])
-        if eliminated[:with_block, :3].all():  # rows with a block come first, block first
-            first, rest = slice(0, with_block), slice(with_block, None)
-            parts = [(rest, None, None, spare[rest])] if with_block < len(spare) else []
+        if eliminated[:with_block, :3].all():  # the rows already have the required order
+            block_rows, without_block = slice(0, with_block), slice(with_block, None)
+            parts = (
+                [(without_block, None, None, spare[without_block])]
+                if with_block < len(spare)
+                else []
+            )
             if with_block:
-                block = (columns[first, 0] - reduced) // 3
-                parts.append((first, None, block, spare[first, 3:]))
+                block = (columns[block_rows, 0] - reduced) // 3
+                parts.append((block_rows, None, block, spare[block_rows, 3:]))
             return parts
+    # A stable sort moves the three columns of the block to the front.
     order = np.argsort(~eliminated, axis=1, kind="stable")
-    has = eliminated.any(axis=1)
-    parts = [(np.flatnonzero(~has), None, None, spare[~has])] if not has.all() else []
-    if not has.any():
+    has_block = eliminated.any(axis=1)
+    parts = (
+        [(np.flatnonzero(~has_block), None, None, spare[~has_block])] if not has_block.all() else []
+    )
+    if not has_block.any():
         return parts
-    order = order[has]
-    moved = np.take_along_axis(spare[has], order, axis=1)
-    block = (moved[:, 0] - reduced) // 3
-    if (eliminated.sum(axis=1)[has] != 3).any() or (np.diff(moved[:, :3], axis=1) != 1).any():
+    order = order[has_block]
+    sorted_columns = np.take_along_axis(spare[has_block], order, axis=1)
+    block = (sorted_columns[:, 0] - reduced) // 3
+    if (eliminated.sum(axis=1)[has_block] != 3).any() or (
+        np.diff(sorted_columns[:, :3], axis=1) != 1
+    ).any():
         raise ValueError("a row touches two eliminated blocks, or a part of one")
-    return [*parts, (np.flatnonzero(has), order, block, moved[:, 3:])]
+    return [*parts, (np.flatnonzero(has_block), order, block, sorted_columns[:, 3:])]

@@ -1,10 +1,15 @@
-"""Cameras of other programs and publications: read, written, and turned into each other.
+"""Cameras of other programs and publications: reading, writing and conversion.
 
-frame             a camera with its frame in pixels, its image points and rays
-fitting           the camera of a given form that comes nearest to given images of rays
-published         the conventions of the publications, with covariances
-brown             the model in pixels that the programs below have in common
-opencv, colmap, metashape, pix4d, balanced   a module for each form; filestorage: text of OpenCV
-register          the text of cameras.toml
-reading, writing  one door for files of all of them; texts: what the readers share
+frame
+    camera with its frame in pixels, image points and rays
+fitting
+    fit of a camera of a given form to images of rays
+published
+    conventions of publications, with covariances
+brown
+    common model in pixels of the programs below
+opencv, colmap, metashape, pix4d, balanced
+    form of each program; filestorage: text of OpenCV
+reading, writing
+    interface for files of all programs, and cameras.toml; texts: shared functions of the readers
 """

@@ -1,14 +1,14 @@
-"""Cameras in the balanced form of AICON (and Zeiss): Ck, Xh, Yh, A1, A2, R0, A3, B1, B2, C1, C2.
+"""Cameras in the balanced form of AICON and Zeiss: Ck, Xh, Yh, A1, A2, R0, A3, B1, B2, C1, C2.
 
-With x, y from the principal point, to the right and up, r2 = x2 + y2,
+With x, y from the principal point, to the right and up, r2 = x2 + y2:
 
     dx = x (A1 (r2 - R0^2) + A2 (r4 - R0^4) + A3 (r6 - R0^6))
          + B1 (r2 + 2 x2) + 2 B2 x y + C1 x + C2 y
     dy = y (A1 (r2 - R0^2) + ...)          + B2 (r2 + 2 y2) + 2 B1 x y
     measured x = Xh + Ck u/w + dx,   y = Yh + Ck v/w + dy          (Ck is negative)
 
-dx, dy are those of the ideal point; where a protocol takes them at the measured one, name the
-convention correction_subtracted. mm.
+dx and dy are evaluated at the ideal point. For a protocol that evaluates them at the measured
+point, state the convention correction_subtracted. All lengths are in mm.
 
 Source: Luhmann, Robson, Kyle & Boehm, Close-Range Photogrammetry and 3D Imaging, ch. 3.3.
 """
@@ -29,19 +29,25 @@ FILM_KEYS = ("format_width", "format_height")
 LARGEST_FILM_MM = 1000
 FRAME_KEYS = ("columns", "lines", "pixel_width", "pixel_height", *FILM_KEYS)
 CONVENTIONS_OF = ("distortion_of_ideal", "correction_subtracted")
-# places of KEYS, R0 apart, in the order of camera.PARAMETERS
+# Indices in camera.PARAMETERS of the KEYS, except R0.
 PLACES = {"Ck": 0, "Xh": 1, "Yh": 2, "A1": 3, "A2": 4, "A3": 5}
 PLACES |= {"B1": 7, "B2": 8, "C1": 11, "C2": 12}
 
 
 @dataclass(frozen=True)
 class Balanced:
-    """A camera of the balanced form.
+    """Camera of the balanced form.
 
-    values      {key: number} of KEYS, mm
-    convention  at which point the terms are taken, see above
-    error_px    largest distance of an image point over the frame from the camera that was converted
-    covariance  (13, 13) in the order of camera.PARAMETERS (its first row is that of -Ck), or None
+    Attributes
+    ----------
+    values : dict of {str: float}
+        Values of KEYS, mm.
+    convention : str
+        One of CONVENTIONS_OF: the point at which the terms are evaluated.
+    error_px : float
+        Largest error of the conversion over the frame, px.
+    covariance : ndarray, shape (13, 13), or None
+        Covariance in the order of camera.PARAMETERS; the first row refers to -Ck.
     """
 
     values: dict
@@ -51,47 +57,86 @@ class Balanced:
 
 
 def from_balanced(camera, pixel_mm, size_px):
-    """FramedCamera: the same numbers, but for the sign of Ck.
+    """Convert to a FramedCamera with equal numbers, except for the sign of Ck.
 
-    pixel_mm  one number, or width and height        size_px  (columns, lines)
+    Parameters
+    ----------
+    camera : Balanced
+        The camera.
+    pixel_mm : float or array_like, shape (2,)
+        Size of a pixel, or width and height, mm.
+    size_px : sequence of two int
+        Columns and lines.
+
+    Returns
+    -------
+    FramedCamera
     """
+    # The balanced form is a form of tankcal, so that no fit is necessary.
     return make_framed_camera(*_interior_of(camera), pixel_mm, size_px)
 
 
 def film_from_balanced(camera, format_mm):
-    """FramedCamera of a film (2,) width and height, mm; see from_balanced."""
+    """Convert to a FramedCamera on film of a given width and height (2,), mm."""
     return make_film_camera(*_interior_of(camera), format_mm)
 
 
 def _interior_of(camera):
-    """(13,) and Form."""
+    """Interior parameters (13,) and Form."""
     interior = np.zeros(13)
     for key, place in PLACES.items():
         interior[place] = camera.values[key]
+    # Ck is negative, c positive.
     interior[0] = abs(interior[0])
     return interior, Form(camera.convention, "b1_b2", float(camera.values["R0"]))
 
 
 def to_balanced(camera, radius_mm, convention="distortion_of_ideal", covariance=None):
-    """Balanced of a FramedCamera: exact where K4, P3, P4 are 0 and the convention suits.
+    """Convert a FramedCamera, exactly for K4 = P3 = P4 = 0 and a suitable convention.
 
-    radius_mm   R0, 0: not balanced
-    covariance  (13, 13) of camera.interior, or None
+    Parameters
+    ----------
+    camera : FramedCamera
+        The camera.
+    radius_mm : float
+        R0, mm; 0 without a balance.
+    convention : str, optional
+        One of CONVENTIONS_OF.
+    covariance : array_like, shape (13, 13), optional
+        Covariance of camera.interior.
+
+    Returns
+    -------
+    Balanced
     """
     form = Form(convention, "b1_b2", float(radius_mm))
-    found = convert_camera(
+    converted = convert_camera(
         camera.interior, camera.form, form, camera.size_px, camera.pixel_mm, USUAL, covariance
     )
-    values = {key: float(found.interior[place]) for key, place in PLACES.items()}
+    values = {key: float(converted.interior[place]) for key, place in PLACES.items()}
+    # The radius is not part of the fitted parameters.
     values |= {"Ck": -values["Ck"], "R0": float(radius_mm)}
     ordered = {key: values[key] for key in KEYS}
-    return Balanced(ordered, convention, found.error_px, found.covariance)
+    return Balanced(ordered, convention, converted.error_px, converted.covariance)
 
 
 def parse(text, notes):
-    """(Balanced, {frame key: number}) of lines such as Ck -24.1, or None; problems go to notes.
+    """Read a camera from lines such as "Ck -24.1"; problems are added to `notes`.
 
-    The convention and the frame may be left out. A # begins a remark.
+    The convention and the frame are optional. A # begins a remark.
+
+    Parameters
+    ----------
+    text : str
+        Content of the file.
+    notes : Notes
+        Receives the problems.
+
+    Returns
+    -------
+    camera : Balanced
+    frame : dict of {str: float}
+        Values of FRAME_KEYS in the file.
     """
     values, convention = {}, "distortion_of_ideal"
     for row, line in enumerate(text.splitlines(), 1):
@@ -122,8 +167,8 @@ def parse(text, notes):
         elif key in ("columns", "lines"):
             values[key] = notes.count(words[1], row, key)
         elif key in KEYS or key in FRAME_KEYS:
-            low = 0 if key in FRAME_KEYS else None
-            values[key] = notes.number(words[1], row, key, above=low)
+            lower_limit = 0 if key in FRAME_KEYS else None
+            values[key] = notes.number(words[1], row, key, above=lower_limit)
         else:
             notes.tell(
                 message(
@@ -134,12 +179,14 @@ def parse(text, notes):
                 row,
                 short_text(key),
             )
-    _check(values, notes)
+    # The camera is created even with problems, so that a single run reports all problems.
+    _check_values(values, notes)
     camera = Balanced({key: values.get(key, 0.0) for key in KEYS}, convention)
     return camera, {key: values[key] for key in FRAME_KEYS if key in values}
 
 
-def _check(values, notes):
+def _check_values(values, notes):
+    """Check required keys and signs; problems are added to `notes`."""
     for key in ("Ck", "R0"):
         if key not in values:
             notes.tell(
@@ -173,18 +220,20 @@ def _check(values, notes):
         notes.tell(message("convert_balanced_radius", "below 0; expected a radius in mm"), key="R0")
 
 
-def _written(value):
+def _format_value(value):
+    """Text of an integer or of a float with all digits."""
     return str(value) if isinstance(value, int) else exact_text(value)
 
 
 def text_of(camera, framed_camera):
-    """The lines of a Balanced camera and of its frame."""
+    """Text of a Balanced camera and of its frame."""
     lines = ["# camera in the balanced form: mm, x to the right, y up"]
     lines += [f"{key} {exact_text(value)}" for key, value in camera.values.items()]
     lines += [f"convention {camera.convention}"]
+    # A film has a format; a digital camera has columns, lines and pixels.
     keys, frame = FILM_KEYS, framed_camera.film_mm
     if frame is None:
         keys = [key for key in FRAME_KEYS if key not in FILM_KEYS]
         frame = (*framed_camera.size_px, *framed_camera.pixel_mm)
-    lines += [f"{key} {_written(value)}" for key, value in zip(keys, frame, strict=True)]
+    lines += [f"{key} {_format_value(value)}" for key, value in zip(keys, frame, strict=True)]
     return "\n".join(lines) + "\n"

@@ -1,13 +1,14 @@
-"""The model that programs of computer vision have in common, in pixels.
+"""Common camera model of computer vision programs, in pixels.
 
-With x, y the ray to the right and down, r2 = x2 + y2,
+With x, y the ray to the right and down, r2 = x2 + y2:
 
     x' = x (1 + k1 r2 + k2 r4 + k3 r6 + k4 r8) + (2 p1 x y + p2 (r2 + 2 x2)) (1 + p3 r2 + p4 r4)
     y' = y (1 + k1 r2 + k2 r4 + k3 r6 + k4 r8) + (p1 (r2 + 2 y2) + 2 p2 x y) (1 + p3 r2 + p4 r4)
     column = cx + fx x' + skew y'              line = cy + fy y'
 
-counted from the centre of the first pixel. It is the plain form of tankcal with pixels of width
-fy/fx times their height: exactly so without a skew, which is fitted by A and B.
+Columns and lines count from the centre of the first pixel. The model equals the plain form of
+tankcal, with pixels whose width is fy/fx times their height. The conversion is exact without a
+skew. A skew is approximated by A and B.
 """
 
 from dataclasses import dataclass
@@ -31,9 +32,16 @@ DECENTRING = ("P1", "P2", "P3", "P4")
 
 @dataclass(frozen=True)
 class Brown:
-    """A camera in pixels, see above.
+    """Camera in pixels.
 
-    fx, fy, cx, cy, skew  px          k  (4,) k1..k4          p  (4,) p1..p4 in OpenCV's order
+    Attributes
+    ----------
+    fx, fy, cx, cy, skew : float
+        Focal lengths, principal point and skew, px.
+    k : tuple of four
+        k1..k4.
+    p : tuple of four
+        p1..p4, in the order of OpenCV.
     """
 
     fx: float
@@ -47,10 +55,14 @@ class Brown:
 
 @dataclass(frozen=True)
 class Has:
-    """Which terms a program has beside one focal length and the principal point.
+    """Terms of a program, in addition to one focal length and the principal point.
 
-    radial      how many k           decentring  how many p
-    two_focals  fx and fy            skew        a skew
+    Attributes
+    ----------
+    radial, decentring : int
+        Numbers of coefficients k and p.
+    two_focals, skew : bool
+        True if the program has fx and fy, and a skew.
     """
 
     radial: int = 4
@@ -60,104 +72,140 @@ class Has:
 
 
 def image_of_brown(brown, rays):
-    """(n, 2) columns and lines of rays (n, 2), which are counted as in tankcal, y up."""
+    """Columns and lines (n, 2) of rays (n, 2), which have the axes of tankcal (y up)."""
     x, y = rays[:, 0], -rays[:, 1]
     r2 = x * x + y * y
     k1, k2, k3, k4 = brown.k
     p1, p2, p3, p4 = brown.p
     radial = 1 + r2 * (k1 + r2 * (k2 + r2 * (k3 + r2 * k4)))
-    more = 1 + r2 * (p3 + r2 * p4)
-    along = x * radial + (2 * p1 * x * y + p2 * (r2 + 2 * x * x)) * more
-    down = y * radial + (p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) * more
+    decentring = 1 + r2 * (p3 + r2 * p4)
+    x_image = x * radial + (2 * p1 * x * y + p2 * (r2 + 2 * x * x)) * decentring
+    y_image = y * radial + (p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) * decentring
     return np.column_stack(
-        [brown.cx + brown.fx * along + brown.skew * down, brown.cy + brown.fy * down]
+        [brown.cx + brown.fx * x_image + brown.skew * y_image, brown.cy + brown.fy * y_image]
     )
 
 
 def from_brown(brown, pixel_mm, size_px):
-    """FramedCamera, of the plain Form().
+    """Convert to a FramedCamera in the plain Form().
 
-    pixel_mm  height of a pixel; the width follows from fx and fy
+    Parameters
+    ----------
+    brown : Brown
+        The camera.
+    pixel_mm : float
+        Height of a pixel, mm; the width follows from fx and fy.
+    size_px : sequence of two int
+        Columns and lines.
 
-    Raises SolutionError where the distortion folds the image within the frame.
+    Returns
+    -------
+    FramedCamera
+
+    Raises
+    ------
+    SolutionError
+        If the distortion folds the image within the frame.
     """
     pixel = np.array([pixel_mm * (brown.fy / brown.fx), pixel_mm])
     points = frame_points(size_px)
-    straight = make_framed_camera(_interior(brown, pixel, size_px), Form(), pixel, size_px)
-    upright = points - np.outer(points[:, 1] - brown.cy, [brown.skew / brown.fy, 0])
-    rays = rays_of(straight, upright)
-    interior = straight.interior
+    without_skew = make_framed_camera(_interior(brown, pixel, size_px), Form(), pixel, size_px)
+    # The image without its skew has the rays of the camera without skew.
+    unskewed = points - np.outer(points[:, 1] - brown.cy, [brown.skew / brown.fy, 0])
+    rays = rays_of(without_skew, unskewed)
+    interior = without_skew.interior
     if brown.skew:
         used = [name for name, value in zip(PARAMETERS, interior, strict=True) if value]
-        seen = pixels_to_mm(points, pixel, size_px)
+        image_mm = pixels_to_mm(points, pixel, size_px)
         used = ("x0", "y0", "A", "B", *used)
-        interior = fit(rays, seen, pixel, Form(), interior, used).interior
-    found = make_framed_camera(interior, Form(), pixel, size_px)
+        interior = fit(rays, image_mm, pixel, Form(), interior, used).interior
+    framed = make_framed_camera(interior, Form(), pixel, size_px)
     return make_framed_camera(
-        interior, Form(), pixel, size_px, differences_px(found, rays, points).max()
+        interior, Form(), pixel, size_px, differences_px(framed, rays, points).max()
     )
 
 
 def _interior(brown, pixel_mm, size_px):
+    """Interior parameters (13,) of the plain form, without the skew."""
     c = brown.fy * pixel_mm[1]
     x0, y0 = pixels_to_mm([[brown.cx, brown.cy]], pixel_mm, size_px)[0]
     p1, p2, p3, p4 = brown.p
     radial = [k / c ** (2 * i) for i, k in enumerate(brown.k, 1)]
+    # Coefficients of rays become coefficients of image points in mm; y changes its sign.
     return np.array([c, x0, y0, *radial, p2 / c, -p1 / c, p3 / c**2, p4 / c**4, 0, 0])
 
 
 def to_brown(camera, has=None):
-    """(Brown, largest error over the frame, px) of a FramedCamera: exact where `has` allows it.
+    """Convert a FramedCamera, exactly if the terms allow it, else by a fit over the frame.
 
-    Else fitted over the frame, in pixels.
+    Parameters
+    ----------
+    camera : FramedCamera
+        The camera.
+    has : Has, optional
+        Available terms; None: all.
+
+    Returns
+    -------
+    brown : Brown
+    error : float
+        Largest error over the frame, px.
     """
     has = has or Has()
     points = frame_points(camera.size_px)
     rays = rays_of(camera, points)
-    brown = _by_formula(camera, has)
+    # The error is evaluated in the same way for both methods.
+    brown = _convert_exactly(camera, has)
     if brown is None:
-        brown = _fitted(camera, has, rays, points)
-    off = np.hypot(*(image_of_brown(brown, rays) - points).T)
-    return brown, float(off.max())
+        brown = _fit_brown(camera, has, rays, points)
+    distances = np.hypot(*(image_of_brown(brown, rays) - points).T)
+    return brown, float(distances.max())
 
 
-def _by_formula(camera: FramedCamera, has):
-    """Brown by formula, or None."""
+def _convert_exactly(camera: FramedCamera, has):
+    """Brown by formula, or None if a required term is not available."""
     if CONVENTIONS[camera.form.convention]:
         return None
     q = balanced_about(camera.interior, camera.form, 0.0)[0]
+    # Parameters without a counterpart must be zero.
     missing = [*q[3 + has.radial : 7], *q[7 + has.decentring : 11], *q[11:]]
     width, height = camera.pixel_mm
     if np.any(missing) or (width != height and not has.two_focals):
         return None
-    return _brown(q, 0.0, 0.0, camera)
+    return _create_brown(q, 0.0, 0.0, camera)
 
 
-def _fitted(camera, has, rays, points):
-    """Brown by a fit in pixels that are square, of the height of the camera's."""
+def _fit_brown(camera, has, rays, points):
+    """Brown by a fit with square pixels of the height of the camera's pixels."""
     side = camera.pixel_mm[1]
     start = balanced_about(camera.interior, camera.form, 0.0)[0]
     if CONVENTIONS[camera.form.convention] > 0:
+        # A correction added to the measured point has the opposite sign of a distortion.
         start[3:9] *= -1
     used = ("c", "x0", "y0", *RADIAL[: has.radial], *DECENTRING[: has.decentring])
     start[[i for i, name in enumerate(PARAMETERS) if name not in used]] = 0.0
-    usual = {"K1", "K2", "K3", "P1", "P2"}
+    usual_names = {"K1", "K2", "K3", "P1", "P2"}
     lens = [
         name
         for name, value in zip(PARAMETERS, camera.interior, strict=True)
-        if name in used and (value or name in usual or name[0] in "cxy")
+        if name in used and (value or name in usual_names or name[0] in "cxy")
     ]
-    extras = [name for name, there in (("scale", has.two_focals), ("skew", has.skew)) if there]
+    extras = [
+        name
+        for name, is_available in (("scale", has.two_focals), ("skew", has.skew))
+        if is_available
+    ]
     square = np.array([side, side])
-    seen = pixels_to_mm(points, square, camera.size_px)
-    found = fit(rays, seen, square, Form(), start, lens, extras)
-    return _brown(found.interior, found.scale, found.skew, camera, square)
+    image_mm = pixels_to_mm(points, square, camera.size_px)
+    result = fit(rays, image_mm, square, Form(), start, lens, extras)
+    return _create_brown(result.interior, result.scale, result.skew, camera, square)
 
 
-def _brown(q, scale, skew, camera, pixel_mm=None):
-    """Brown of interior parameters (13,) of the plain form, and of what acts after it."""
+def _create_brown(q, scale, skew, camera, pixel_mm=None):
+    """Brown from interior parameters (13,) of the plain form, scale and skew."""
     width, height = camera.pixel_mm if pixel_mm is None else pixel_mm
     columns, lines = camera.size_px
+    # Inverse of _interior: coefficients in mm become coefficients of rays.
     fx, fy = q[0] * (1 + scale) / width, q[0] / height
     middle = ((columns - 1) / 2 + q[1] / width, (lines - 1) / 2 - q[2] / height)
     k = tuple(float(q[2 + i] * q[0] ** (2 * i)) for i in range(1, 5))
@@ -169,5 +217,5 @@ def _brown(q, scale, skew, camera, pixel_mm=None):
         float(middle[1]),
         float(-skew * fy) + 0.0,
         k,
-        tuple(float(one) + 0.0 for one in p),
+        tuple(float(value) + 0.0 for value in p),
     )

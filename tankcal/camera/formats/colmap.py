@@ -2,7 +2,9 @@
 
     CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]
 
-The models are those of OpenCV, but the corner of the first pixel is 0, 0, its centre 0.5, 0.5.
+The models equal those of OpenCV, except for the origin: the corner of the first pixel is 0, 0, and
+its centre 0.5, 0.5.
+
 Source: COLMAP's documentation, camera models and output format.
 """
 
@@ -24,17 +26,24 @@ MODELS = {
     "FULL_OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
 }
 ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-HALF = 0.5
-EXACT_PX = 1e-9
+HALF = 0.5  # px, from the corner of a pixel to its centre
+EXACT_PX = 1e-9  # error below which a conversion counts as exact
 
 
 @dataclass(frozen=True)
 class Colmap:
-    """A camera as COLMAP has it.
+    """Camera of COLMAP.
 
-    model     one of MODELS         size_px  (2,) columns, lines
-    params    as MODELS names them, px and units of the focal length
-    error_px  largest distance of an image point over the frame from the camera that was converted
+    Attributes
+    ----------
+    model : str
+        One of MODELS.
+    size_px : tuple of int
+        Columns and lines.
+    params : tuple
+        Parameters named in MODELS, px; distortion for rays.
+    error_px : float
+        Largest error of the conversion over the frame, px.
     """
 
     model: str
@@ -44,34 +53,58 @@ class Colmap:
 
 
 def from_colmap(camera, pixel_mm):
-    """FramedCamera, of the plain Form().
+    """Convert to a FramedCamera in the plain Form().
 
-    pixel_mm  height of a pixel; the width follows from fx and fy
+    Parameters
+    ----------
+    camera : Colmap
+        The camera.
+    pixel_mm : float
+        Height of a pixel, mm; the width follows from fx and fy.
 
-    Raises SolutionError where the distortion folds the image within the frame.
+    Returns
+    -------
+    FramedCamera
+
+    Raises
+    ------
+    SolutionError
+        If the distortion folds the image within the frame.
     """
     values = dict(zip(MODELS[camera.model], camera.params, strict=True))
     fx, fy = values.get("fx", values.get("f")), values.get("fy", values.get("f"))
+    # COLMAP counts from the corner of the first pixel, OpenCV from its centre.
     matrix = [[fx, 0, values["cx"] - HALF], [0, fy, values["cy"] - HALF], [0, 0, 1]]
     coefficients = np.array([values.get(name, 0.0) for name in ORDER])
     return from_opencv(OpenCV(np.array(matrix), coefficients), pixel_mm, camera.size_px)
 
 
 def to_colmap(camera, model=None):
-    """Colmap of a FramedCamera: exact where the model has all the terms, else fitted.
+    """Convert a FramedCamera, exactly if the model has all terms, else by a fit.
 
-    model  one of MODELS; None: the simplest that is exact, else FULL_OPENCV
+    Parameters
+    ----------
+    camera : FramedCamera
+        The camera.
+    model : str, optional
+        One of MODELS. None: the simplest exact model, else FULL_OPENCV.
+
+    Returns
+    -------
+    Colmap
     """
     if model is not None:
-        return _as_model(camera, model)
+        return _convert_to_model(camera, model)
+    # MODELS are ordered by complexity.
     for name in MODELS:
-        found = _as_model(camera, name)
-        if found.error_px < EXACT_PX:
+        converted = _convert_to_model(camera, name)
+        if converted.error_px < EXACT_PX:
             break
-    return found
+    return converted
 
 
-def _as_model(camera, model):
+def _convert_to_model(camera, model):
+    """Convert a FramedCamera to a model of COLMAP."""
     names = MODELS[model]
     has = Has(
         radial=sum(name in names for name in ("k1", "k2", "k3")),
@@ -87,22 +120,24 @@ def _as_model(camera, model):
         "cx": brown.cx + HALF,
         "cy": brown.cy + HALF,
     }
+    # COLMAP has no p3, p4 and k4; the rational terms are zero.
     values |= dict(zip(ORDER, (*brown.k[:2], *brown.p[:2], brown.k[2], 0.0, 0.0, 0.0), strict=True))
     return Colmap(model, camera.size_px, tuple(values[name] for name in names), error)
 
 
 def parse(text, notes):
-    """[(name, Colmap)] of a cameras.txt; problems go to notes."""
-    found = []
+    """Cameras [(name, Colmap)] of a cameras.txt; problems are added to `notes`."""
+    cameras = []
     for row, line in enumerate(text.splitlines(), 1):
         words = line.split()
         if not words or words[0].startswith("#"):
             continue
-        camera = _parsed(words, row, notes)
+        camera = _parse_camera(words, row, notes)
         if camera is None:
             continue
         name = notes.name(words[0], row, "CAMERA_ID")
-        if name in [other for other, _ in found]:
+        # A repeated camera is reported, but kept, so that all problems are found.
+        if name in [other for other, _ in cameras]:
             notes.tell(
                 message(
                     "convert_colmap_twice",
@@ -112,18 +147,19 @@ def parse(text, notes):
                 row,
                 "CAMERA_ID",
             )
-        found.append((name, camera))
-    if not found and not notes.problems:
+        cameras.append((name, camera))
+    if not cameras and not notes.problems:
         notes.tell(
             message(
                 "convert_colmap_none",
                 "no camera; expected lines such as 1 OPENCV 4000 3000 and its parameters",
             )
         )
-    return found
+    return cameras
 
 
-def _parsed(words, row, notes):
+def _parse_camera(words, row, notes):
+    """Colmap from the words of a line, or None; problems are added to `notes`."""
     if len(words) < 4:
         notes.tell(
             message(
@@ -157,14 +193,15 @@ def _parsed(words, row, notes):
         return None
     size = (notes.count(words[2], row, "WIDTH"), notes.count(words[3], row, "HEIGHT"))
     params = tuple(
-        notes.number(one, row, name, above=0 if name[0] == "f" else None)
-        for name, one in zip(names, texts, strict=True)
+        notes.number(text, row, name, above=0 if name[0] == "f" else None)
+        for name, text in zip(names, texts, strict=True)
     )
     return Colmap(model, size, params)
 
 
 def text_of(cameras):
-    """cameras.txt of [(name, Colmap)]; cameras are numbered when a name is no number."""
+    """Text of a cameras.txt for [(name, Colmap)]; names that are no numbers become numbers."""
+    # Cameras are numbered unless every name is a number.
     are_numbers = all(name.isdecimal() and name.isascii() for name, _ in cameras)
     lines = ["# Camera list with one line of data per camera:"]
     lines += [

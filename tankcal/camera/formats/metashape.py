@@ -1,17 +1,17 @@
-"""Cameras of Agisoft Metashape: the frame camera, and its calibration as XML.
+"""Cameras of Agisoft Metashape: frame camera, and its calibration as XML.
 
-With x, y the ray to the right and down, r2 = x2 + y2,
+With x, y the ray to the right and down, r2 = x2 + y2:
 
     x' = x (1 + K1 r2 + K2 r4 + K3 r6 + K4 r8) + (P1 (r2 + 2 x2) + 2 P2 x y) (1 + P3 r2 + P4 r4)
     y' = y (1 + K1 r2 + K2 r4 + K3 r6 + K4 r8) + (P2 (r2 + 2 y2) + 2 P1 x y) (1 + P3 r2 + P4 r4)
     u = width/2 + cx + x' f + x' B1 + y' B2        v = height/2 + cy + y' f
 
-P1 and P2 have changed places against OpenCV. u, v count from the corner of the first pixel, cx and
-cy from the middle of the image. All but B2 is exact; the pixels are f/(f + B1) times as wide as
-high.
+P1 and P2 are exchanged relative to OpenCV. u and v count from the corner of the first pixel, cx and
+cy from the middle of the image. The conversion is exact except for B2. The width of a pixel is f/(f
++ B1) times its height.
 
-Source: Metashape user manual, appendix "Camera models"; (1 + P3 r2 + P4 r4) stands in those of
-PhotoScan 1.2 to 1.4.
+Source: Metashape user manual, appendix "Camera models"; (1 + P3 r2 + P4 r4) occurs in the manuals
+of PhotoScan 1.2 to 1.4.
 """
 
 from dataclasses import dataclass
@@ -33,12 +33,18 @@ OLD = ("fx", "fy", "skew")
 
 @dataclass(frozen=True)
 class Metashape:
-    """A frame camera as Metashape has it, see above.
+    """Frame camera of Metashape.
 
-    size_px           (2,) columns, lines
-    f, cx, cy, b1, b2 px                k  (4,) k1..k4          p  (4,) p1..p4
-    error_px          largest distance of an image point over the frame from the camera that was
-                      converted
+    Attributes
+    ----------
+    size_px : tuple of int
+        Columns and lines.
+    f, cx, cy, b1, b2 : float
+        Focal length, principal point and affinity, px.
+    k, p : tuple of four
+        k1..k4 and p1..p4.
+    error_px : float
+        Largest error of the conversion over the frame, px.
     """
 
     size_px: tuple[int, int]
@@ -53,14 +59,31 @@ class Metashape:
 
 
 def from_metashape(camera, pixel_mm):
-    """FramedCamera, of the plain Form(): exact but for B2, which A and B are fitted to.
+    """Convert to a FramedCamera in the plain Form(), exactly except for B2.
 
-    pixel_mm  height of a pixel; the width follows from f and B1
+    Parameters
+    ----------
+    camera : Metashape
+        The camera.
+    pixel_mm : float
+        Height of a pixel, mm; the width follows from f and B1.
 
-    Raises SolutionError where the distortion folds the image within the frame.
+    Returns
+    -------
+    FramedCamera
+
+    Raises
+    ------
+    SolutionError
+        If the distortion folds the image within the frame.
+
+    Notes
+    -----
+    B2 is approximated by A and B.
     """
     columns, lines = camera.size_px
     p1, p2, p3, p4 = camera.p
+    # P1 and P2 are exchanged relative to OpenCV.
     brown = Brown(
         camera.f + camera.b1,
         camera.f,
@@ -74,10 +97,21 @@ def from_metashape(camera, pixel_mm):
 
 
 def to_metashape(camera):
-    """Metashape of a FramedCamera: exact for its plain form without affinity, else fitted."""
+    """Convert a FramedCamera, exactly in its plain form without affinity, else by a fit.
+
+    Parameters
+    ----------
+    camera : FramedCamera
+        The camera.
+
+    Returns
+    -------
+    Metashape
+    """
     brown, error = to_brown(camera)
     columns, lines = camera.size_px
     p1, p2, p3, p4 = brown.p
+    # cx and cy count from the middle of the image.
     return Metashape(
         camera.size_px,
         brown.fy,
@@ -92,8 +126,8 @@ def to_metashape(camera):
 
 
 def parse(text, notes):
-    """Metashape of the text of a calibration, or None; problems go to notes."""
-    root = _root(text, notes)
+    """Metashape camera from the text of a calibration, or None; problems are added to `notes`."""
+    root = _calibration_root(text, notes)
     if root is None:
         return None
     found = {}
@@ -119,6 +153,7 @@ def parse(text, notes):
             key="projection",
         )
         return None
+    # PhotoScan before 1.2 wrote fx, fy and skew.
     if any(key in found for key in OLD):
         expected = message(
             "convert_metashape_old",
@@ -126,10 +161,14 @@ def parse(text, notes):
         )
         notes.tell(expected, key=next(key for key in OLD if key in found))
         return None
-    size = tuple(_needed(found, key, notes.count, notes) for key in ("width", "height"))
-    f = _needed(found, "f", lambda one, key: notes.number(one, key=key, above=0), notes)
+    # Values that are missing or wrong are replaced, so that all problems are found in one run.
+    size = tuple(_read_required(found, key, notes.count, notes) for key in ("width", "height"))
+    f = _read_required(
+        found, "f", lambda text_of_f, key: notes.number(text_of_f, key=key, above=0), notes
+    )
     terms = [notes.number(found[key], key=key) if key in found else 0.0 for key in TERMS]
     camera = Metashape(size, f, *terms[:4], tuple(terms[4:8]), tuple(terms[8:]))
+    # f + B1 is the focal length in x, which must be positive.
     if f + terms[2] <= 0:
         notes.tell(
             message(
@@ -143,7 +182,8 @@ def parse(text, notes):
     return camera
 
 
-def _root(text, notes):
+def _calibration_root(text, notes):
+    """Root element of a calibration, or None; problems are added to `notes`."""
     root = xml_root(text, notes)
     if root is not None and root.tag != "calibration":
         expected = message(
@@ -155,21 +195,23 @@ def _root(text, notes):
     return root
 
 
-def _needed(found, key, read, notes):
-    if found.get(key, "") == "":
+def _read_required(texts, key, read, notes):
+    """Value of a required key, read by `read`; 2 for a missing value, with a problem."""
+    if texts.get(key, "") == "":
         notes.tell(message("convert_metashape_missing", "missing; expected a number"), key=key)
         return 2
-    return read(found[key], key=key)
+    return read(texts[key], key=key)
 
 
 def text_of(camera):
-    """XML of a Metashape camera; what is 0 beyond K3 and P2 is left out."""
+    """XML of a Metashape camera; k4, p3 and p4 are omitted if zero."""
     values = dict(zip(TERMS, (camera.cx, camera.cy, camera.b1, camera.b2), strict=False))
     values |= dict(zip(TERMS[4:], (*camera.k, *camera.p), strict=True))
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<calibration>"]
     lines += ["  <projection>frame</projection>"]
     lines += [f"  <width>{camera.size_px[0]}</width>", f"  <height>{camera.size_px[1]}</height>"]
     lines += [f"  <f>{exact_text(camera.f)}</f>"]
+    # k4, p3 and p4 are optional.
     for key, value in values.items():
         if value or key not in ("k4", "p3", "p4"):
             lines.append(f"  <{key}>{exact_text(value)}</{key}>")

@@ -1,20 +1,20 @@
-"""Cameras of Pix4D: perspective lenses, and the file of them that a project has.
+"""Cameras of Pix4D: perspective lenses, and the camera file of a project.
 
-That is PROJECT_pix4d_calibrated_internal_camera_parameters.cam.
+The file is PROJECT_pix4d_calibrated_internal_camera_parameters.cam.
 
-With x, y the ray to the right and down, r2 = x2 + y2,
+With x, y the ray to the right and down, r2 = x2 + y2:
 
     x' = x (1 + R1 r2 + R2 r4 + R3 r6) + 2 T1 x y + T2 (r2 + 2 x2)
     y' = y (1 + R1 r2 + R2 r4 + R3 r6) + 2 T2 x y + T1 (r2 + 2 y2)
     x mm = Px + F x'        y mm = Py + F y'
 
-from the upper left corner of the sensor: T1 and T2 are p1 and p2 of OpenCV. The file calls R1, R2,
-R3 K1, K2, K3, and gives the sensor's size in a remark.
+Coordinates count from the upper left corner of the sensor. T1 and T2 are p1 and p2 of OpenCV. The
+file names R1, R2, R3 as K1, K2, K3, and states the size of the sensor in a remark.
 
-Source: Pix4D support, "How are the internal and external camera parameters defined?". A caption
-there puts the origin at the lower left corner; the calibration of this form that Pessoa 2017 prints
-(quadro 1) agrees with tables 6 to 9 as written here only, and with y upwards by no signs of T1
-and T2.
+Source: Pix4D support, "How are the internal and external camera parameters defined?". A caption in
+this source places the origin at the lower left corner. The calibration printed by Pessoa 2017
+(quadro 1) agrees with tables 6 to 9 only for the definition above. With y upwards, no signs of T1
+and T2 agree.
 """
 
 import re
@@ -28,17 +28,25 @@ KEYS = ("F", "Px", "Py", "K1", "K2", "K3", "T1", "T2")
 HEAD = re.compile(r"pix4d camera calibration file\s*(.*)", re.IGNORECASE)
 INPHO = re.compile(r"\s*camera_calibration_file", re.IGNORECASE)
 SENSOR = re.compile(r"sensor width of\s+([\d.eE+-]+)\s*x\s*([\d.eE+-]+)", re.IGNORECASE)
-SAME_SHAPE = 0.01  # the remark gives the sensor's size to few digits
+SAME_SHAPE = 0.01  # relative; the remark states the size of the sensor with few digits
 
 
 @dataclass(frozen=True)
 class Pix4D:
-    """A perspective camera as Pix4D has it, see above.
+    """Perspective camera of Pix4D.
 
-    sensor_mm     (2,) width, height            f_mm, px_mm, py_mm  mm
-    r             (3,) R1, R2, R3               t                   (2,) T1, T2
-    error_px      largest distance of an image point over the frame from the camera that was
-                  converted
+    Attributes
+    ----------
+    sensor_mm : tuple of float
+        Width and height of the sensor, mm.
+    f_mm, px_mm, py_mm : float
+        Focal length and principal point, mm.
+    r : tuple of three
+        R1, R2, R3.
+    t : tuple of two
+        T1, T2.
+    error_px : float
+        Largest error of the conversion over the frame, px.
     """
 
     sensor_mm: tuple[float, float]
@@ -51,26 +59,51 @@ class Pix4D:
 
 
 def from_pix4d(camera, size_px):
-    """FramedCamera, of the plain Form(): exact.
+    """Convert to a FramedCamera in the plain Form(), exactly.
 
-    size_px  (columns, lines); the pixels are the sensor's height over the lines, and square
+    Parameters
+    ----------
+    camera : Pix4D
+        The camera.
+    size_px : sequence of two int
+        Columns and lines. The pixels are square, with a side of the sensor's height divided by the
+        lines.
 
-    Raises SolutionError where the distortion folds the image within the frame.
+    Returns
+    -------
+    FramedCamera
+
+    Raises
+    ------
+    SolutionError
+        If the distortion folds the image within the frame.
     """
     pixel = camera.sensor_mm[1] / size_px[1]
     f = camera.f_mm / pixel
     k1, k2, k3 = camera.r
+    # Pix4D counts from the corner of the sensor, tankcal from the centre of the first pixel.
     middle = (camera.px_mm / pixel - 0.5, camera.py_mm / pixel - 0.5)
-    # a sensor whose printed size is not quite that of its pixels keeps its middle
+    # The printed width may differ slightly from the width of the pixels; the middle is kept.
     shift = (size_px[0] - camera.sensor_mm[0] / pixel) / 2
     brown = Brown(f, f, middle[0] + shift, middle[1], 0.0, (k1, k2, k3, 0.0), (*camera.t, 0.0, 0.0))
     return from_brown(brown, pixel, size_px)
 
 
 def to_pix4d(camera):
-    """Pix4D of a FramedCamera: exact for its plain form with square pixels, else fitted."""
+    """Convert a FramedCamera, exactly in its plain form with square pixels, else by a fit.
+
+    Parameters
+    ----------
+    camera : FramedCamera
+        The camera.
+
+    Returns
+    -------
+    Pix4D
+    """
     brown, error = to_brown(camera, Has(radial=3, decentring=2, two_focals=False, skew=False))
     pixel = float(camera.pixel_mm[1])
+    # Square pixels with the height of the camera's pixels.
     sensor = (camera.size_px[0] * pixel, camera.size_px[1] * pixel)
     return Pix4D(
         sensor,
@@ -84,7 +117,7 @@ def to_pix4d(camera):
 
 
 def parse(text, notes):
-    """[(name, Pix4D)] of a .cam file; problems go to notes."""
+    """Cameras [(name, Pix4D)] of a .cam file; problems are added to `notes`."""
     parts = []
     for row, line in enumerate(text.splitlines(), 1):
         head = HEAD.match(line.strip())
@@ -99,6 +132,7 @@ def parse(text, notes):
         if head:
             name = notes.name(head[1], row) if head[1] else str(len(parts))
             parts.append((name, row, []))
+        # Lines after a heading belong to its camera.
         elif parts:
             parts[-1][2].append((row, line.strip()))
         elif line.strip():
@@ -117,17 +151,18 @@ def parse(text, notes):
                 "convert_pix4d_none", "no camera; expected a line Pix4D camera calibration file 0"
             )
         )
-    return [(name, _parsed(row, lines, notes)) for name, row, lines in parts]
+    return [(name, _parse_camera(row, lines, notes)) for name, row, lines in parts]
 
 
-def _parsed(head_row, lines, notes):
+def _parse_camera(head_row, lines, notes):
+    """Pix4D camera from numbered lines; problems are added to `notes`."""
     values, sensor = {}, None
     for row, line in lines:
         size = SENSOR.search(line)
         if line.startswith("#"):
             if size:
                 sides = size.groups()
-                sensor = tuple(notes.number(one, row, "sensor width", above=0) for one in sides)
+                sensor = tuple(notes.number(side, row, "sensor width", above=0) for side in sides)
             continue
         key, _, value = line.partition(" ")
         if not line:
@@ -153,6 +188,7 @@ def _parsed(head_row, lines, notes):
             notes.tell(
                 message("convert_pix4d_missing", "missing; is the file complete?"), head_row, key
             )
+            # A substitute value lets the remaining keys be checked.
             values[key] = 0.0
     if sensor is None:
         expected = message(
@@ -167,13 +203,14 @@ def _parsed(head_row, lines, notes):
 
 
 def frame_fits_sensor(camera, size_px):
-    """Has a frame of size_px (columns, lines) the proportions of the sensor?"""
+    """Whether a frame of size_px (columns, lines) has the proportions of the sensor."""
+    # Equal proportions mean square pixels.
     width, height = camera.sensor_mm
     return abs(width * size_px[1] / (height * size_px[0]) - 1) <= SAME_SHAPE
 
 
 def text_of(cameras):
-    """.cam text of [(name, Pix4D)]."""
+    """Text of a .cam file for [(name, Pix4D)]."""
     lines = []
     for name, camera in cameras:
         width, height = map(exact_text, camera.sensor_mm)

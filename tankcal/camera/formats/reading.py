@@ -1,13 +1,13 @@
-"""One door for cameras of other programs: the file tells which of them it is from.
+"""Interface to camera files of other programs; the program is recognised from the content.
 
 kind       file
-opencv     YAML and XML of FileStorage, JSON with K and dist; opencv-json means the same
+opencv     YAML and XML of FileStorage, JSON with K and dist; opencv-json has the same meaning
 colmap     cameras.txt
 metashape  XML of a calibration
 pix4d      PROJECT_pix4d_calibrated_internal_camera_parameters.cam
 aicon      lines of the balanced form, such as Ck -24.1
 
-The files of OpenCV, COLMAP and Metashape do not say how large a pixel is.
+The files of OpenCV, COLMAP and Metashape do not contain the size of a pixel.
 """
 
 from pathlib import Path
@@ -19,34 +19,69 @@ from tankcal.errors import SolutionError, reason_of
 from tankcal.messages import message
 from tankcal.text.decoding import decode_text
 
-SAME_PIXEL = 0.01  # pixels of a file and as given may differ by as much, for rounding
-PIXELS_UM = (0.1, 100.0)  # of cameras and scanners
+SAME_PIXEL = 0.01  # relative tolerance between the pixel in the file and the given pixel
+PIXELS_UM = (0.1, 100.0)  # range of pixels of cameras and scanners
 KINDS = ("opencv", "opencv-json", "colmap", "metashape", "pix4d", "aicon")
 
 
 def read_camera(path, kind=None, pixel_um=None, size_px=None):
-    """[(name, FramedCamera)] of a file of another program.
+    """Read the cameras of a file of another program.
 
-    kind      one of KINDS; None: it is recognised
-    pixel_um  height of a pixel, um; needed for OpenCV, COLMAP and Metashape, elsewhere compared
-    size_px   (columns, lines), where the file does not say it: OpenCV, Pix4D, AICON
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    kind : str, optional
+        One of KINDS; by default recognised from the content.
+    pixel_um : float, optional
+        Height of a pixel, um. Required for OpenCV, COLMAP and Metashape; compared with the file for
+        other kinds.
+    size_px : sequence of two int, optional
+        Columns and lines, if the file does not contain them (OpenCV, Pix4D, AICON).
 
-    Raises InputError with every problem of the file.
+    Returns
+    -------
+    list of (str, FramedCamera)
+
+    Raises
+    ------
+    InputError
+        With every problem of the file.
     """
     path = Path(path)
     notes = Notes(path.name or str(path))
-    text = _text(path, notes)
+    text = _read_text(path, notes)
     notes.stop()
     return cameras_of(text, notes.file, kind, pixel_um, size_px)
 
 
 def cameras_of(text, file, kind=None, pixel_um=None, size_px=None):
-    """[(name, FramedCamera)] of the text of a file; see read_camera. file: its name."""
+    """Read the cameras from the text of a file.
+
+    Parameters
+    ----------
+    text : str
+        Content of the file.
+    file : str
+        Name of the file, for messages.
+    kind, pixel_um, size_px
+        As in `read_camera`.
+
+    Returns
+    -------
+    list of (str, FramedCamera)
+
+    Raises
+    ------
+    InputError
+        With every problem of the file.
+    """
     notes = Notes(file)
     _check_arguments(kind, pixel_um, size_px, notes)
-    kind = kind or _recognised(text, notes)
+    kind = kind or _recognise_kind(text, notes)
     notes.stop()
-    found = _PARSERS[kind](text, notes, file, size_px)
+    parsed = _PARSERS[kind](text, notes, file, size_px)
+    # Only files of Pix4D and AICON can determine the size of a pixel.
     needs_pixel = kind not in ("pix4d", "aicon")
     if needs_pixel and pixel_um is None:
         expected = message(
@@ -57,8 +92,9 @@ def cameras_of(text, file, kind=None, pixel_um=None, size_px=None):
         notes.tell(expected, key="pixel_um")
     notes.stop()
     pixel_mm = None if pixel_um is None else pixel_um * 1e-3
+    # Conversion starts only after all problems of the text are known.
     cameras = []
-    for name, convert in found:
+    for name, convert in parsed:
         try:
             cameras.append((name, convert(pixel_mm)))
         except SolutionError as error:
@@ -74,6 +110,7 @@ def cameras_of(text, file, kind=None, pixel_um=None, size_px=None):
 
 
 def _check_arguments(kind, pixel_um, size_px, notes):
+    """Check kind, pixel and size; problems are added to `notes`."""
     if kind is not None and kind not in KINDS:
         notes.tell(
             message(
@@ -100,8 +137,8 @@ def _check_arguments(kind, pixel_um, size_px, notes):
             notes.count(number, key=key)
 
 
-def _text(path, notes):
-    """The text of a file, or None after telling what is wrong."""
+def _read_text(path, notes):
+    """Text of a file, or None; problems are added to `notes`."""
     try:
         if not path.is_file():
             notes.tell(message("convert_not_found", "not found; expected a file of cameras"))
@@ -117,6 +154,7 @@ def _text(path, notes):
             )
         )
         return None
+    # One byte more than the limit is read, to detect a longer file.
     if len(data) > LONGEST:
         notes.tell(
             message(
@@ -140,8 +178,9 @@ def _text(path, notes):
     return text
 
 
-def _recognised(text, notes):
-    """Kind of a text, or None after telling that it is none that is known."""
+def _recognise_kind(text, notes):
+    """Kind of a text, or None; a problem is added to `notes`."""
+    # The beginning of the file is sufficient, and limits the search.
     start = text.lstrip()[:2000]
     lines = [line.split() for line in text.splitlines()[:200]]
     words = [line[0] for line in lines if line and not line[0].startswith("#")]
@@ -153,6 +192,7 @@ def _recognised(text, notes):
         return "pix4d"
     if "Ck" in words:
         return "aicon"
+    # A line of cameras.txt: CAMERA_ID MODEL WIDTH ...
     if any(len(line) > 3 and line[1].isupper() and line[2].isdecimal() for line in lines) or (
         "CAMERA_ID" in start
     ):
@@ -167,41 +207,49 @@ def _recognised(text, notes):
     return None
 
 
-def _opencv(text, notes, file, size_px):
+def _read_opencv(text, notes, file, size_px):
+    """Name and converter of an OpenCV camera, as a list."""
     parsed = filestorage.parse(text, notes)
     if parsed is None:
         return []
     camera, size = parsed
-    size = _one_size(size, size_px, notes)
+    size = _resolve_size(size, size_px, notes)
     return [(_stem(file), lambda pixel: from_opencv(camera, pixel, size))]
 
 
-def _colmap(text, notes, _file, _size):
-    def later(camera):
+def _read_colmap(text, notes, _file, _size):
+    """Names and converters of the cameras of a cameras.txt."""
+
+    def converter(camera):
         return lambda pixel: colmap.from_colmap(camera, pixel)
 
-    return [(name, later(camera)) for name, camera in colmap.parse(text, notes)]
+    # A function for each camera binds the camera of its own iteration.
+    return [(name, converter(camera)) for name, camera in colmap.parse(text, notes)]
 
 
-def _metashape(text, notes, file, _size):
+def _read_metashape(text, notes, file, _size):
+    """Name and converter of a Metashape camera, as a list."""
     camera = metashape.parse(text, notes)
     if camera is None:
         return []
     return [(_stem(file), lambda pixel: metashape.from_metashape(camera, pixel))]
 
 
-def _pix4d(text, notes, _file, size_px):
-    def later(camera):
+def _read_pix4d(text, notes, _file, size_px):
+    """Names and converters of the cameras of a .cam file."""
+
+    def converter(camera):
         def convert(pixel_mm):
             _refuse_other_pixel(camera.sensor_mm[1] / size_px[1], pixel_mm)
             return pix4d.from_pix4d(camera, size_px)
 
         return convert
 
-    found = pix4d.parse(text, notes)
+    cameras = pix4d.parse(text, notes)
+    # The file contains the sensor in mm, but no columns and lines.
     if size_px is None:
-        _one_size(None, None, notes)
-    for name, camera in found:
+        _resolve_size(None, None, notes)
+    for name, camera in cameras:
         if (
             size_px is not None
             and not notes.problems
@@ -219,10 +267,11 @@ def _pix4d(text, notes, _file, size_px):
                 camera=name,
             )
             notes.tell(expected, key="columns")
-    return [(name, later(camera)) for name, camera in found]
+    return [(name, converter(camera)) for name, camera in cameras]
 
 
-def _aicon(text, notes, file, size_px):
+def _read_balanced(text, notes, file, size_px):
+    """Name and converter of a camera in the balanced form, as a list."""
     camera, frame = balanced.parse(text, notes)
     film_mm = [frame[key] for key in balanced.FILM_KEYS if key in frame]
     if len(film_mm) == 1:
@@ -233,6 +282,7 @@ def _aicon(text, notes, file, size_px):
             ),
             key="format_width",
         )
+    # A film has no pixels, so that both statements contradict each other.
     if len(film_mm) == 2 and len(frame) > 2:
         notes.tell(
             message(
@@ -242,9 +292,12 @@ def _aicon(text, notes, file, size_px):
             key="format_width",
         )
     if film_mm:
-        return [(_stem(file), _film_of(camera, film_mm))]
-    given = (frame["columns"], frame["lines"]) if {"columns", "lines"} <= set(frame) else None
-    size = _one_size(given, size_px, notes)
+        return [(_stem(file), _film_converter(camera, film_mm))]
+    size_in_file = (
+        (frame["columns"], frame["lines"]) if {"columns", "lines"} <= set(frame) else None
+    )
+    size = _resolve_size(size_in_file, size_px, notes)
+    # A single side of a pixel leaves the other side undefined.
     sides = [frame[key] for key in ("pixel_width", "pixel_height") if key in frame]
     if len(sides) == 1:
         notes.tell(
@@ -269,41 +322,51 @@ def _aicon(text, notes, file, size_px):
     return [(_stem(file), convert)]
 
 
-def _film_of(camera, film_mm):
-    """From a size of pixels, mm, or None, to the FramedCamera of a Balanced camera on film."""
+def _film_converter(camera, film_mm):
+    """Converter of a Balanced camera on film.
+
+    The converter accepts the size of a pixel in mm, or None, and returns a FramedCamera.
+    """
 
     def convert(pixel_mm):
         if pixel_mm is None:
             return balanced.film_from_balanced(camera, film_mm)
+        # Scanned film: the number of pixels follows from the format.
         size_px = [max(2, round(side / pixel_mm)) for side in film_mm]
         return balanced.from_balanced(camera, pixel_mm, size_px)
 
     return convert
 
 
-def _one_size(of_file, given, notes):
-    """(columns, lines) of the file or as given; told when there is none, or when they differ."""
-    if of_file is None and given is None:
+def _resolve_size(size_in_file, given_size, notes):
+    """Columns and lines of the file, or as given; both may not be missing or differ."""
+    if size_in_file is None and given_size is None:
         notes.tell(
             message(
                 "convert_no_size", "missing; the file does not hold it: give columns and lines"
             ),
             key="format_px",
         )
-    elif of_file is not None and given is not None and tuple(of_file) != tuple(given):
+    elif (
+        size_in_file is not None
+        and given_size is not None
+        and tuple(size_in_file) != tuple(given_size)
+    ):
         expected = message(
             "convert_other_size",
             "{columns} x {lines} px; expected {given_columns} x {given_lines}, as given",
-            columns=of_file[0],
-            lines=of_file[1],
-            given_columns=given[0],
-            given_lines=given[1],
+            columns=size_in_file[0],
+            lines=size_in_file[1],
+            given_columns=given_size[0],
+            given_lines=given_size[1],
         )
         notes.tell(expected, key="format_px")
-    return of_file or given
+    return size_in_file or given_size
 
 
 def _refuse_other_pixel(of_file_mm, given_mm):
+    """Raise SolutionError if the pixel in the file and the given pixel differ."""
+    # A given pixel only confirms the value in the file.
     if given_mm is not None and abs(of_file_mm / given_mm - 1) > SAME_PIXEL:
         raise SolutionError(
             message(
@@ -320,10 +383,10 @@ def _stem(file):
 
 
 _PARSERS = {
-    "opencv": _opencv,
-    "opencv-json": _opencv,
-    "colmap": _colmap,
-    "metashape": _metashape,
-    "pix4d": _pix4d,
-    "aicon": _aicon,
+    "opencv": _read_opencv,
+    "opencv-json": _read_opencv,
+    "colmap": _read_colmap,
+    "metashape": _read_metashape,
+    "pix4d": _read_pix4d,
+    "aicon": _read_balanced,
 }

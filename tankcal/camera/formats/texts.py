@@ -1,6 +1,6 @@
-"""What all readers of camera files share: numbers, counts and names, every problem told.
+"""Functions shared by the readers of camera files: numbers, counts, names and problems.
 
-Sizes of files are limited, so that a hostile one is refused before it is parsed.
+File sizes are limited, so that a hostile file is rejected before it is parsed.
 """
 
 import math
@@ -11,8 +11,8 @@ from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.text.naming import MAX_NAME, is_name
 
-LONGEST = 4_000_000  # bytes of a file, letters of a text
-MOST_PIXELS = 1_000_000
+LONGEST = 4_000_000  # largest number of bytes in a file, or of characters in a text
+MOST_PIXELS = 1_000_000  # largest number of columns or lines
 NAME_IS = message(
     "convert_name_is",
     "a name of at most {most} letters, digits, spaces or _ - . ( ) / #",
@@ -21,31 +21,44 @@ NAME_IS = message(
 
 
 class Notes:
-    """Collects the problems of one file; `stop` raises them all."""
+    """Collection of the problems of a file."""
 
     def __init__(self, file):
-        """Of the file that its user calls `file`."""
+        """Start a collection for a file with this name for the user."""
         self.file = file
         self.problems = []
 
     def tell(self, expected, row=None, key=None):
-        """One more problem."""
+        """Add a problem."""
         self.problems.append(Problem(self.file, expected, row, key))
 
     def stop(self):
-        """Raise InputError when there is a problem."""
+        """Raise InputError if any problem was added."""
         if self.problems:
             raise InputError(self.problems)
 
     def number(self, text, row=None, key=None, above=None):
-        """A finite number of a text or number; nan after telling what is wrong.
+        """Finite number from a text or number; nan after adding a problem.
 
-        above  the number must be larger
+        Parameters
+        ----------
+        text : str or float
+            Text or number.
+        row, key : optional
+            Place of the text.
+        above : float, optional
+            The number must exceed this value.
+
+        Returns
+        -------
+        float
         """
         try:
+            # bool is a subclass of int, but no number here.
             value = math.nan if isinstance(text, bool) else float(text)
         except (TypeError, ValueError, OverflowError):
             value = math.nan
+        # Python accepts "1_000" as a number; camera files do not.
         if not math.isfinite(value) or (isinstance(text, str) and "_" in text):
             self.tell(
                 message(
@@ -70,10 +83,10 @@ class Notes:
         return value
 
     def count(self, text, row=None, key=None):
-        """A number of pixels, 2 to MOST_PIXELS; 2 after telling what is wrong."""
-        before = len(self.problems)
+        """Number of pixels, 2 to MOST_PIXELS; 2 after adding a problem."""
+        problem_count = len(self.problems)
         value = self.number(text, row, key)
-        if len(self.problems) > before:
+        if len(self.problems) > problem_count:
             return 2
         if value != round(value) or not 2 <= value <= MOST_PIXELS:
             self.tell(
@@ -90,7 +103,7 @@ class Notes:
         return int(value)
 
     def name(self, text, row=None, key=None):
-        """A name of a camera; "camera" after telling that it is none."""
+        """Name of a camera; "camera" after adding a problem."""
         text = text.strip()
         if is_name(text):
             return text
@@ -108,7 +121,8 @@ class Notes:
 
 
 def xml_root(text, notes):
-    """Outermost element of an XML text without a document type, or None; problems go to notes."""
+    """Root element of an XML text, or None; problems are added to `notes`."""
+    # Entities can expand without limit.
     lower = text.lower()
     if "<!doctype" in lower or "<!entity" in lower:
         notes.tell(
@@ -132,7 +146,7 @@ def xml_root(text, notes):
 
 
 def tell_outermost(root, expected, notes):
-    """Report an XML file whose outermost element is another one."""
+    """Add a problem for an XML file with the wrong root element."""
     notes.tell(
         message(
             "convert_outermost",
@@ -144,22 +158,23 @@ def tell_outermost(root, expected, notes):
 
 
 def given_twice():
-    """What is wrong with a key that stands there twice."""
+    """Message for a repeated key."""
     return message("convert_given_twice", "given twice; expected once")
 
 
 def short_text(value):
-    """What was found, short enough for a message."""
+    """Text of a value, shortened for a message."""
     text = repr(value) if isinstance(value, str) else str(value)
     return text if len(text) <= 40 else text[:37] + "..."
 
 
 def only_letters(text, instead="camera"):
-    """A name made of the end of a file's name, or `instead` when nothing of it is left."""
-    kept = re.sub(r"[^\w .()/#-]", "_", text).strip(" ._-()/#")[:MAX_NAME]
-    return kept or instead
+    """Valid name derived from a file name, or `instead` if no valid character remains."""
+    # Characters outside the rules for names become underscores.
+    name = re.sub(r"[^\w .()/#-]", "_", text).strip(" ._-()/#")[:MAX_NAME]
+    return name or instead
 
 
 def exact_text(value):
-    """The shortest text of a number that reads back as the same number."""
+    """Shortest text of a number that reads back as the same number."""
     return repr(float(value))

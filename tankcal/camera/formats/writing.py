@@ -1,6 +1,7 @@
-"""Cameras as the text of a file of another program, or of cameras.toml.
+"""Cameras as text of a file of another program, or of cameras.toml.
 
-What a form cannot express is fitted over the frame and stated with the text.
+Terms that a form does not contain are approximated by a fit over the frame. The error is returned
+with the text.
 """
 
 import re
@@ -16,29 +17,55 @@ from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.text.naming import is_name
 
-# The text of an entry of cameras.toml: every number reads back as the same number.
+# In an entry of cameras.toml, every number reads back as the same number.
 #
-# The size of a pixel, which changes its unit on the way, may differ by its last bit.
+# The size of a pixel, which is converted to micrometres, may differ by its last bit.
 
-NEIGHBOURS = 4
+NEIGHBOURS = 4  # neighbouring numbers tried for an exact text in micrometres
 
 
 def cameras_toml_entry(name, interior, form, size_px, pixel_mm, sds=None, film_mm=None):
-    """An entry [cameras.NAME] of cameras.toml, with its final line break.
+    """Entry [cameras.NAME] of cameras.toml, with a final line break.
 
-    name      of the camera                 interior  (13,)        form  its Form
-    size_px   (2,) columns, lines           pixel_mm  one number, or width and height
-    sds       (13,) standard deviations in the order of PARAMETERS, 0: held; nan: none
-    film_mm   (2,) width and height of a film, which has no pixels, or None
+    Parameters
+    ----------
+    name : str
+        Name of the camera.
+    interior : array_like, shape (13,)
+        Interior parameters.
+    form : Form
+        Form of the distortion.
+    size_px : sequence of two int
+        Columns and lines.
+    pixel_mm : float or array_like, shape (2,)
+        Size of a pixel, or width and height, mm.
+    sds : array_like, shape (13,), optional
+        Standard deviations in the order of PARAMETERS; 0 for a held parameter, nan for none.
+    film_mm : array_like, shape (2,), optional
+        Width and height of a film, which has no pixels, mm.
 
-    What is 0 and has no standard deviation is left out, but for c, x0 and y0.
+    Returns
+    -------
+    str
 
-    Raises InputError for a name that no camera can have.
+    Raises
+    ------
+    InputError
+        For an invalid name.
+
+    Notes
+    -----
+    Parameters with the value 0 and without a standard deviation are omitted, except c, x0 and y0.
     """
-    frame = _pixels(size_px, pixel_mm) if film_mm is None else [f"format_mm = {_pair(film_mm)}"]
-    lines = [f"[cameras.{_quoted(name)}]", *frame]
+    frame = (
+        _frame_lines(size_px, pixel_mm)
+        if film_mm is None
+        else [f"format_mm = {_format_pair(film_mm)}"]
+    )
+    lines = [f"[cameras.{_quote_name(name)}]", *frame]
     for place, parameter in enumerate(PARAMETERS):
         sd = np.nan if sds is None else float(sds[place])
+        # c, x0 and y0 are always written.
         if place < 3 or interior[place] or np.isfinite(sd):
             lines.append(f"{value_key(parameter)} = {exact_text(interior[place])}")
         if np.isfinite(sd):
@@ -49,20 +76,26 @@ def cameras_toml_entry(name, interior, form, size_px, pixel_mm, sds=None, film_m
     return "\n".join(lines) + "\n"
 
 
-def _pixels(size_px, pixel_mm):
-    """Lines of the frame of a camera with pixels."""
+def _frame_lines(size_px, pixel_mm):
+    """Lines that describe the frame of a camera with pixels."""
     width, height = np.broadcast_to(pixel_mm, 2)
-    sizes = [_micrometres(width)] if width == height else list(map(_micrometres, (width, height)))
+    # A single number for square pixels, else width and height.
+    sizes = (
+        [_format_micrometres(width)]
+        if width == height
+        else list(map(_format_micrometres, (width, height)))
+    )
     pixel = sizes[0] if len(sizes) == 1 else f"[{', '.join(sizes)}]"
     return [f"format_px = [{int(size_px[0])}, {int(size_px[1])}]", f"pixel_um = {pixel}"]
 
 
-def _pair(values):
+def _format_pair(values):
+    """Text of an array of two numbers."""
     return f"[{', '.join(map(exact_text, values))}]"
 
 
 def value_key(parameter):
-    """Key of a parameter in cameras.toml: its name and its unit."""
+    """Key of a parameter in cameras.toml: name and unit."""
     unit = UNITS[parameter]
     return f"{parameter}_{unit}" if unit else parameter
 
@@ -72,19 +105,21 @@ def sd_key_of(parameter):
     return f"s_{parameter}_mm" if UNITS[parameter] == "mm" else f"s_{parameter}"
 
 
-def _micrometres(pixel_mm):
-    """Text of a size that, read as micrometres, gives the same number of millimetres again."""
+def _format_micrometres(pixel_mm):
+    """Text of a size in micrometres that gives the same number of millimetres when read."""
     value = float(pixel_mm) * 1e3
     low = high = value
     for _ in range(NEIGHBOURS):
-        for one in (low, high):
-            if one * 1e-3 == pixel_mm:
-                return exact_text(one)
+        for candidate in (low, high):
+            if candidate * 1e-3 == pixel_mm:
+                return exact_text(candidate)
+        # Rounding of the unit conversion is undone by trying neighbouring numbers.
         low, high = np.nextafter(low, 0), np.nextafter(high, np.inf)
     return exact_text(value)
 
 
-def _quoted(name):
+def _quote_name(name):
+    """Name as a TOML key; raises InputError for an invalid name."""
     if not is_name(name) or name != name.strip():
         raise InputError(
             Problem(
@@ -97,15 +132,20 @@ def _quoted(name):
                 ),
             )
         )
+    # TOML requires quotes for names with spaces and other characters.
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else f'"{name}"'
 
 
 @dataclass(frozen=True)
 class Written:
-    """The text of a camera file.
+    """Text of a camera file.
 
-    text      its content
-    error_px  of each camera, the largest distance of an image point over the frame
+    Attributes
+    ----------
+    text : str
+        Content of the file.
+    error_px : tuple of float
+        Largest error of each camera over the frame, px.
     """
 
     text: str
@@ -113,16 +153,31 @@ class Written:
 
 
 def write_camera(kind, cameras, sds=None, radius_mm=0.0, file="cameras"):
-    """Written: the text of a file of cameras.
+    """Convert cameras to the text of a file.
 
-    kind       one of KINDS; files of SINGLE hold one camera
-    cameras    [(name, FramedCamera)]
-    sds        [(13,) or None] of each camera, which only cameras.toml has a place for; or None
-    radius_mm  R0 of "aicon"
-    file       what messages call the place where the cameras are from
+    Parameters
+    ----------
+    kind : str
+        One of KINDS; a file of a kind in SINGLE contains one camera.
+    cameras : list of (str, FramedCamera)
+        Names and cameras.
+    sds : list of array_like (13,) or None, optional
+        Standard deviations of each camera, written to cameras.toml only.
+    radius_mm : float, optional
+        R0 of "aicon", mm.
+    file : str, optional
+        Name of the source of the cameras, for messages.
 
-    Raises InputError for another kind or number of cameras and for a film in a form of pixels,
-    SolutionError where the distortion folds the image within the frame.
+    Returns
+    -------
+    Written
+
+    Raises
+    ------
+    InputError
+        For an unknown kind, a wrong number of cameras, or a film in a kind that requires pixels.
+    SolutionError
+        If the distortion folds the image within the frame.
     """
     if kind not in KINDS:
         expected = message(
@@ -147,17 +202,18 @@ def write_camera(kind, cameras, sds=None, radius_mm=0.0, file="cameras"):
                 form=kind,
             )
         raise InputError(Problem("cameras", expected))
+    # The nominal pixels of a film must not be written as real pixels.
     if kind not in IN_MM:
         _refuse_film(kind, cameras, file)
     if kind == "cameras.toml":
-        return _register(cameras, sds)
+        return _write_register(cameras, sds)
     if kind == "aicon":
-        return _aicon(cameras, radius_mm)
+        return _write_balanced(cameras, radius_mm)
     return _WRITERS[kind](cameras)
 
 
 def _refuse_film(kind, cameras, file):
-    """Raise InputError for cameras whose pixels are not known."""
+    """Raise InputError for cameras on film, whose pixels are unknown."""
     expected = message(
         "convert_to_pixels",
         "missing; a file of kind {form} is in pixels: expected the size of a pixel, "
@@ -166,62 +222,71 @@ def _refuse_film(kind, cameras, file):
     )
     problems = [
         Problem(file, expected, None, f"{name}.pixel_um")
-        for name, one in cameras
-        if one.film_mm is not None
+        for name, camera in cameras
+        if camera.film_mm is not None
     ]
     if problems:
         raise InputError(problems)
 
 
-def _register(cameras, sds):
+def _write_register(cameras, sds):
+    """Text of cameras.toml."""
     sds = [None] * len(cameras) if sds is None else sds
     entries = [
-        cameras_toml_entry(name, one.interior, one.form, one.size_px, one.pixel_mm, sd, one.film_mm)
-        for (name, one), sd in zip(cameras, sds, strict=True)
+        cameras_toml_entry(
+            name, camera.interior, camera.form, camera.size_px, camera.pixel_mm, sd, camera.film_mm
+        )
+        for (name, camera), sd in zip(cameras, sds, strict=True)
     ]
-    return Written("\n".join(entries), tuple(one.error_px for _, one in cameras))
+    return Written("\n".join(entries), tuple(camera.error_px for _, camera in cameras))
 
 
-def _aicon(cameras, radius_mm):
+def _write_balanced(cameras, radius_mm):
+    """Text of a camera in the balanced form."""
     camera = cameras[0][1]
-    found = balanced.to_balanced(camera, radius_mm)
-    return Written(balanced.text_of(found, camera), (found.error_px,))
+    converted = balanced.to_balanced(camera, radius_mm)
+    return Written(balanced.text_of(converted, camera), (converted.error_px,))
 
 
-def _opencv(cameras):
+def _write_opencv(cameras):
+    """FileStorage YAML of an OpenCV camera."""
     camera = cameras[0][1]
-    found = to_opencv(camera)
-    return Written(filestorage.text_of(found, camera.size_px), (found.error_px,))
+    converted = to_opencv(camera)
+    return Written(filestorage.text_of(converted, camera.size_px), (converted.error_px,))
 
 
-def _opencv_json(cameras):
+def _write_opencv_json(cameras):
+    """JSON of an OpenCV camera."""
     camera = cameras[0][1]
-    found = to_opencv(camera)
-    return Written(filestorage.json_of(found, camera.size_px), (found.error_px,))
+    converted = to_opencv(camera)
+    return Written(filestorage.json_of(converted, camera.size_px), (converted.error_px,))
 
 
-def _metashape(cameras):
-    found = metashape.to_metashape(cameras[0][1])
-    return Written(metashape.text_of(found), (found.error_px,))
+def _write_metashape(cameras):
+    """XML of a Metashape camera."""
+    converted = metashape.to_metashape(cameras[0][1])
+    return Written(metashape.text_of(converted), (converted.error_px,))
 
 
-def _colmap(cameras):
-    found = [(name, colmap.to_colmap(camera)) for name, camera in cameras]
-    return Written(colmap.text_of(found), tuple(camera.error_px for _, camera in found))
+def _write_colmap(cameras):
+    """Text of a cameras.txt of COLMAP."""
+    converted = [(name, colmap.to_colmap(camera)) for name, camera in cameras]
+    return Written(colmap.text_of(converted), tuple(camera.error_px for _, camera in converted))
 
 
-def _pix4d(cameras):
-    found = [(name, pix4d.to_pix4d(camera)) for name, camera in cameras]
-    return Written(pix4d.text_of(found), tuple(camera.error_px for _, camera in found))
+def _write_pix4d(cameras):
+    """Text of a .cam file of Pix4D."""
+    converted = [(name, pix4d.to_pix4d(camera)) for name, camera in cameras]
+    return Written(pix4d.text_of(converted), tuple(camera.error_px for _, camera in converted))
 
 
 _WRITERS = {
-    "opencv": _opencv,
-    "opencv-json": _opencv_json,
-    "colmap": _colmap,
-    "metashape": _metashape,
-    "pix4d": _pix4d,
+    "opencv": _write_opencv,
+    "opencv-json": _write_opencv_json,
+    "colmap": _write_colmap,
+    "metashape": _write_metashape,
+    "pix4d": _write_pix4d,
 }
-SINGLE = ("opencv", "opencv-json", "metashape", "aicon")  # one camera a file
-IN_MM = ("cameras.toml", "aicon")  # forms that need no pixels
+SINGLE = ("opencv", "opencv-json", "metashape", "aicon")  # kinds with one camera in a file
+IN_MM = ("cameras.toml", "aicon")  # kinds that do not require pixels
 KINDS = ("cameras.toml", *_WRITERS, "aicon")

@@ -1,6 +1,6 @@
-"""Monte Carlo of models with many rows: JCGM 101:2008 and JCGM 102:2011.
+"""Monte Carlo simulation of models with many rows: JCGM 101:2008 and JCGM 102:2011.
 
-`simulate` draws, `verdict` says whether the GUM intervals may stand; tables are `QuadraticRows`.
+`simulate` draws, and `verdict` validates the GUM intervals. Capacity tables are `QuadraticRows`.
 """
 
 from tankcal.gum.monte_carlo.goal import NAMES as ESTIMATES

@@ -1,7 +1,8 @@
-"""The inputs of a simulation: draws of them, and the independent coordinates behind them.
+"""Inputs of a simulation: draws, and the independent coordinates behind the draws.
 
-x = mean + T e: e are independent; unit normals behind normal inputs (correlated ones through the
-factor of their correlation), the deviation from the mean itself for every other input.
+x = mean + T e with independent e. A normal input has unit normal coordinates; correlated normal
+inputs use the factor of their correlation. For every other input, e is the deviation from the mean.
+
 Sources: JCGM 101:2008 6.4 (distributions), 6.4.8 and C.5 (correlated normal inputs).
 """
 
@@ -11,37 +12,51 @@ from typing import Protocol
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+# Probabilities at which `is_normal` compares quantiles.
 PROBES = np.array([1e-9, 1e-5, 0.003, 0.1, 0.31, 0.5, 0.77, 0.98, 0.9999, 1 - 1e-9])
 
 
 class Distribution(Protocol):
-    """What an input must offer: mean, sd (its unit, may be inf) and the inverse of its cdf."""
+    """Interface of the distribution of an input.
+
+    Attributes
+    ----------
+    mean, sd : float
+        Mean and standard deviation, in the unit of the input; sd may be inf.
+    """
 
     mean: float
     sd: float
 
     def quantile(self, p):
-        """Values below which the input lies with probability p (array)."""
+        """Values with the probabilities p (array) below them."""
 
 
 def is_normal(distribution):
-    """Whether the quantiles are those of a normal distribution."""
+    """Whether a distribution has the quantiles of a normal distribution."""
     if not np.isfinite(distribution.sd):
         return False
     expected = distribution.mean + distribution.sd * ndtri(PROBES)
-    found = np.asarray(distribution.quantile(PROBES), dtype=float)
-    return bool(np.allclose(found, expected, rtol=0, atol=1e-9 * distribution.sd))
+    quantiles = np.asarray(distribution.quantile(PROBES), dtype=float)
+    return bool(np.allclose(quantiles, expected, rtol=0, atol=1e-9 * distribution.sd))
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """Inputs with what their draws need.
+    """Inputs prepared for drawing.
 
-    distributions  (n,) objects with mean, sd and quantile(p)
-    mean, scale    (n,) means; standard deviations, or half the central 68 % where these are inf
-    normal         (n,) whether an input is normal
-    factor         (n, n) Cholesky factor of the correlation of the normal scores, or None
-    transform      (n, n) T of x = mean + T e, or None: correlated inputs that are not normal
+    Attributes
+    ----------
+    distributions : tuple of Distribution, length n
+        The inputs.
+    mean, scale : ndarray, shape (n,)
+        Means; standard deviations, or half the central 68 % interval for an infinite sd.
+    normal : ndarray of bool, shape (n,)
+        True for a normal input.
+    factor : ndarray, shape (n, n), or None
+        Cholesky factor of the correlation of the normal scores.
+    transform : ndarray, shape (n, n), or None
+        T of x = mean + T e; None for correlated inputs that are not normal.
     """
 
     distributions: tuple
@@ -53,48 +68,55 @@ class Inputs:
 
     @property
     def coordinate_sd(self):
-        """(n,) standard deviation of the independent coordinates e."""
-        own = [distribution.sd for distribution in self.distributions]
-        return np.where(self.normal, 1.0, own)
+        """Standard deviations (n,) of the independent coordinates e."""
+        deviations = [distribution.sd for distribution in self.distributions]
+        return np.where(self.normal, 1.0, deviations)
 
     @property
     def coordinate_scale(self):
-        """(n,) scale of the independent coordinates e: finite where the sd is not."""
+        """Scales (n,) of the independent coordinates e, finite also for an infinite sd."""
         return np.where(self.normal, 1.0, self.scale)
 
     def draws(self, uniforms):
-        """(draws, n) values x and coordinates e (or None) for (draws, n) uniform numbers."""
+        """Values x and coordinates e, (draws, n) each, for uniform numbers (draws, n).
+
+        The coordinates are None without a transform.
+        """
         if self.transform is not None:
             coordinates = self.coordinates(uniforms)
             return self.mean + coordinates @ self.transform.T, coordinates
-        p = ndtr(ndtri(_inside(uniforms)) @ self.factor.T)
-        numbered = enumerate(self.distributions)
-        return np.column_stack([one.quantile(p[:, j]) for j, one in numbered]), None
+        # Gaussian copula: correlated normal scores give correlated uniform numbers.
+        p = ndtr(ndtri(_clip_uniforms(uniforms)) @ self.factor.T)
+        indexed = enumerate(self.distributions)
+        return np.column_stack(
+            [distribution.quantile(p[:, j]) for j, distribution in indexed]
+        ), None
 
     def coordinates(self, uniforms):
-        """(draws, n) independent coordinates e, where there is a transform."""
-        found = _inside(uniforms)
+        """Independent coordinates e for uniform numbers, (draws, n) each; needs a transform."""
+        coordinates = _clip_uniforms(uniforms)
         for j, distribution in enumerate(self.distributions):
             if not self.normal[j]:
-                found[:, j] = distribution.quantile(found[:, j]) - self.mean[j]
-        found[:, self.normal] = ndtri(found[:, self.normal])
-        return found
+                coordinates[:, j] = distribution.quantile(coordinates[:, j]) - self.mean[j]
+        coordinates[:, self.normal] = ndtri(coordinates[:, self.normal])
+        return coordinates
 
 
-def _inside(uniforms):
+def _clip_uniforms(uniforms):
+    """Limit uniform numbers to 2^-40 and 1 - 2^-40, since quantiles at 0 and 1 may be infinite."""
     return np.clip(uniforms, 2.0**-40, 1 - 2.0**-40)
 
 
 def inputs_of(distributions, correlation=None):
-    """Inputs ready for drawing.
+    """Prepare inputs for drawing.
 
     Parameters
     ----------
-    distributions : sequence of Distribution
-        n of them, with mean, sd and quantile(p).
-    correlation : ndarray, shape (n, n), optional
-        Correlation coefficients; of inputs that are not normal those of their normal scores (a
-        Gaussian copula). None: independent.
+    distributions : sequence of Distribution, length n
+        Distributions with mean, sd and quantile(p).
+    correlation : array_like, shape (n, n), optional
+        Correlation matrix; of the normal scores for inputs that are not normal (Gaussian copula).
+        None: independent inputs.
 
     Returns
     -------
@@ -103,7 +125,7 @@ def inputs_of(distributions, correlation=None):
     Raises
     ------
     ValueError
-        When the correlation is no correlation matrix.
+        If `correlation` is not a correlation matrix.
 
     Examples
     --------
@@ -124,28 +146,33 @@ def inputs_of(distributions, correlation=None):
         )
     correlation = np.asarray(correlation, dtype=float)
     factor = _factor(correlation, len(mean))
-    tied = np.any(correlation != np.eye(len(mean)), axis=0)
+    correlated = np.any(correlation != np.eye(len(mean)), axis=0)
+    # A linear transform exists only if all correlated inputs are normal.
     transform = None
-    if np.all(normal[tied]):
+    if np.all(normal[correlated]):
         transform = np.where(normal, scale, 1.0)[:, None] * factor
     return Inputs(distributions, mean, scale, normal, factor, transform)
 
 
 def _factor(correlation, count):
+    """Triangular factor of the correlation matrix, which may be singular."""
     symmetric = correlation.shape == (count, count) and np.allclose(correlation, correlation.T)
     if not symmetric or not np.allclose(np.diag(correlation), 1.0):
         raise ValueError(f"correlation: expected a symmetric {count} x {count} with unit diagonal")
-    tied = np.ix_(*2 * [np.any(correlation != np.eye(count), axis=0)])
-    values, vectors = np.linalg.eigh(correlation[tied])
+    correlated = np.ix_(*2 * [np.any(correlation != np.eye(count), axis=0)])
+    values, vectors = np.linalg.eigh(correlation[correlated])
     if values.min(initial=0.0) < -1e-10:
         raise ValueError(f"not a correlation matrix: eigenvalue {values[0]:.3g}")
+    # QR of the square root of the matrix works without positive definiteness.
     triangle = np.linalg.qr((vectors * np.sqrt(np.clip(values, 0, None))).T, mode="r").T
-    found = np.eye(count)  # a singular part must not reach for the coordinates of others
-    found[tied] = triangle * np.where(np.diag(triangle) < 0, -1.0, 1.0)
-    return found
+    # Only the correlated part is factored, so that it uses no coordinate of another input.
+    factor = np.eye(count)
+    factor[correlated] = triangle * np.where(np.diag(triangle) < 0, -1.0, 1.0)
+    return factor
 
 
 def _scale_of(distribution):
+    """Standard deviation, or half the central 68 % interval if it is infinite."""
     if np.isfinite(distribution.sd):
         return float(distribution.sd)
     low, high = distribution.quantile(np.array([0.16, 0.84]))
