@@ -48,7 +48,7 @@ def blocks_of(measurements, observations):
             observations_of_source.sd, (len(observations_of_source), observations_of_source.rows)
         )
         for row in range(len(observations_of_source)):
-            # All components of a vector belong to a block; of other tables only the listed rows do.
+            # All components of a vector enter a block; of other tables only the listed rows do.
             if not is_vector and trace.rows[row] not in correlated_rows:
                 continue
             axes = (
@@ -80,7 +80,7 @@ def _within_vectors(measurements, places):
 
 
 def _between(correlated, places):
-    """Yield (place, place, r, (file, row, column)) for listed pairs whose values are both adjusted."""
+    """Yield (place, place, r, (file, row, column)) for listed pairs of adjusted values."""
     if correlated is None:
         return
     for i, tables in enumerate(correlated.tables):
