@@ -135,10 +135,10 @@ def _observed(readings, numbers, kind, bend):
     """
     n = len(readings.value)
     setups = [numbers.setups[name] for name in readings.setup]
-    start = [one.station for one in setups] if setups else readings.start
-    tools = [one.instrument for one in setups] if setups else readings.instrument
+    start = [occupation.station for occupation in setups] if setups else readings.start
+    tools = [occupation.instrument for occupation in setups] if setups else readings.instrument
     tools = tools if kind.has("instrument") and len(tools) else (None,) * n
-    heights = np.array([one.height_m for one in setups]) if setups else np.zeros(n)
+    heights = np.array([occupation.height_m for occupation in setups]) if setups else np.zeros(n)
     target = readings.target_height_m
     sets = readings.set or (None,) * n
     # Heights of instrument and target reduce the sight to the marks.
@@ -152,20 +152,20 @@ def _observed(readings, numbers, kind, bend):
         "rise_m": rise if rise.any() else None,
         "bend_per_m": bend,
     }
-    columns = {name: given for name, given in columns.items() if kind.has(name)} | kind.options
+    columns = {name: column for name, column in columns.items() if kind.has(name)} | kind.options
     value = np.array(readings.value, dtype=float)
     if kind.has("instrument"):
         value = _corrected(value, tools, readings.temperature_c, numbers.tools)
     value, sd = (_as_rows(of, n, kind.observes.rows) for of in (value, readings.sd))
     trace = _source(readings, kind, tools).trace()
-    whole = kind.observes(value, sd, **columns, trace=trace)
-    numbered = (*whole.ties, "set") if kind.has("set") else whole.ties
-    known = np.all([getattr(whole, name) >= 0 for name in numbered], axis=0)
+    observations = kind.observes(value, sd, **columns, trace=trace)
+    numbered = (*observations.ties, "set") if kind.has("set") else observations.ties
+    known = np.all([getattr(observations, name) >= 0 for name in numbered], axis=0)
     if readings.horizontal is None:
-        return [whole.taken(known)]
+        return [observations.taken(known)]
     flat = np.asarray(readings.horizontal, dtype=bool)
     return [
-        replace(whole.taken(known & (flat == horizontal)), horizontal=horizontal)
+        replace(observations.taken(known & (flat == horizontal)), horizontal=horizontal)
         for horizontal in (False, True)
     ]
 

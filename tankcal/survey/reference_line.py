@@ -203,8 +203,7 @@ def courses_told(seen, strapped, read):
 
 
 def level_names(offsets):
-    """Number (n,) of the level of each offset; heights within SAME_LEVEL_M in a course are one
-    level."""
+    """Number (n,) of the level of each offset; heights of a course within SAME_LEVEL_M are one."""
     levels, numbers = [], []
     for offset in offsets:
         matches = (
