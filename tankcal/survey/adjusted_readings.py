@@ -92,9 +92,9 @@ class Readings(Sequence):
         """Create `Readings` from a sequence of `Reading`."""
         return cls(
             {
-                field.name: np.fromiter((getattr(row, field.name) for row in rows), _TYPES[field.type],
-                                      len(rows))
-                for field in fields(Reading)
+                item.name: np.fromiter((getattr(row, item.name) for row in rows), _TYPES[item.type],
+                                       len(rows))
+                for item in fields(Reading)
             }
         )  # fmt: skip
 

@@ -150,7 +150,10 @@ def _unmeasured(measurements, points, excluded):
 def named_in(measurements, name):
     """File and row of the first occurrence of a point."""
     tables = [(measurements.image_points, ("point",)), (measurements.control, ("point",))]
-    tables += [(one, ("end", "start", "origin")) for one in measurements.readings]
+    tables += [
+        (table_of_readings, ("end", "start", "origin"))
+        for table_of_readings in measurements.readings
+    ]
     for table, columns in [*tables, (measurements.check, ("point",))]:
         for column in columns if table is not None else ():
             names = getattr(table, column)
@@ -232,9 +235,10 @@ def _numbers(measurements, excluded):
 
 def _instruments(measurements, numbers):
     """Instruments of the network that measured distances."""
-    found = [numbers.tools[name] for name in numbers.instruments]
+    used_tools = [numbers.tools[name] for name in numbers.instruments]
     return tuple(
-        Instrument(one.name, scale_sd=one.u_scale, offset_sd_m=one.u_offset_m) for one in found
+        Instrument(tool.name, scale_sd=tool.u_scale, offset_sd_m=tool.u_offset_m)
+        for tool in used_tools
     )
 
 
@@ -357,9 +361,9 @@ def _images(measurements, points, order, warnings):
     # The transformation error of a comparator is common to repeated readings, so it enters after
     # averaging.
     used, compared = (
-        images_of_part if images.shared_sd_mm is None
-        else replace(images_of_part, sd=np.hypot(images_of_part.sd, images.shared_sd_mm[images_of_part.trace.reading]))
-        for images_of_part in (used, compared)
+        part if images.shared_sd_mm is None
+        else replace(part, sd=np.hypot(part.sd, images.shared_sd_mm[part.trace.reading]))
+        for part in (used, compared)
     )  # fmt: skip
     return used, [compared] if len(compared) else []
 
@@ -367,7 +371,7 @@ def _images(measurements, points, order, warnings):
 def _image_source(measurements):
     """Source of the image points, grouped by camera."""
     images = measurements.image_points
-    cameras = {one.name: one.camera for one in measurements.photos}
+    cameras = {item.name: item.camera for item in measurements.photos}
     return Source(
         images.file,
         images.rows,

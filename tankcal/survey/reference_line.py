@@ -170,7 +170,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Lean:
-    """Slope of the axis towards +x and +y, m/m, and its standard uncertainty; nan: not estimated."""
+    """Slope of the axis towards +x and +y, m/m, and its standard uncertainty; nan: unknown."""
 
     x: float
     y: float

@@ -66,20 +66,20 @@ def gone_with_their_points(adjusted, removed):
     listed = {(table.source, row) for table in adjusted.residuals for row in table.rows.tolist()}
     nan, inf, rejected = float("nan"), float("inf"), []
     for item in removed:
-        table_of_item = survey.table(item.source)
-        if (item.source, item.row) in listed or table_of_item is None:
+        observed = survey.table(item.source)
+        if (item.source, item.row) in listed or observed is None:
             continue
-        trace = table_of_item.trace
+        trace = observed.trace
         value, sd = (
-            np.atleast_1d(table_of_item.value[item.row]),
-            np.atleast_1d(table_of_item.sd[item.row]),
+            np.atleast_1d(observed.value[item.row]),
+            np.atleast_1d(observed.sd[item.row]),
         )
         for k, name in enumerate(trace.element[item.row]):
             rejected.append(
                 Reading(
                     item.kind, trace.ids[item.row], name, trace.file, trace.rows[item.row],
-                    int(trace.repeats[item.row]), table_of_item.unit, float(value[k]), nan, float(sd[k]), 0.0,
-                    float(item.w), nan, inf, inf, True,
+                    int(trace.repeats[item.row]), observed.unit, float(value[k]), nan, float(sd[k]),
+                    0.0, float(item.w), nan, inf, inf, True,
                 )
             )  # fmt: skip
     return rejected
