@@ -256,10 +256,10 @@ def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diam
     -------
     Reduced
     """
-    given = strap.reading_m
+    observed_m = strap.reading_m
     # The corrections act on the length in turn, in the order of the heading.
-    length = (given + tape.correction_m) * (1 + tape.correction)
-    steps = {"certificate": length - given}
+    length = (observed_m + tape.correction_m) * (1 + tape.correction)
+    steps = {"certificate": length - observed_m}
     on_shell = strap.temperature_c is None
     temperature = shell_temperature_c if on_shell else strap.temperature_c
     warmer = 0.0
@@ -303,7 +303,7 @@ def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diam
     variance += sum((item.count * item.sd_m) ** 2 for item in obstructions)
     return Reduced(
         strap,
-        given + sum(steps.values()),
+        observed_m + sum(steps.values()),
         steps,
         float(np.sqrt(variance)),
         tuple(item for item in effects if item.by_m),

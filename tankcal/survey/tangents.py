@@ -183,6 +183,10 @@ def normals_of(azimuth_rad, is_right):
 def circle_of_sights(station_m, azimuth_rad, nominal_m):
     """Fit the circle that sights touch.
 
+    The centre determines the limb of each sight. It starts at the intersection of the bisectors of
+    the stations and moves to the approximate minimum of the sum of absolute residuals, so that
+    single blunders do not move it.
+
     Parameters
     ----------
     station_m : ndarray, shape (n, 2)
@@ -198,12 +202,6 @@ def circle_of_sights(station_m, azimuth_rad, nominal_m):
         Limb of each sight.
     residuals : ndarray, shape (n,)
         In metres.
-
-    Notes
-    -----
-    The centre determines the limb of each sight. It starts at the intersection of the bisectors of the
-    stations and moves to the approximate minimum of the sum of absolute residuals, so that single
-    blunders do not move it.
     """
     centre = _intersect_bisectors(station_m, azimuth_rad)
     curve = SupportCurve(nominal_m, *map(float, centre), np.zeros(0), np.zeros(0))
