@@ -196,7 +196,7 @@ def _group(kind, name, unit, parts, survey):
     factor = factor_sd = np.nan
     weighs = sd > 0  # exactly held values have neither residual nor redundancy
     if redundancy > UNCONTROLLED and weighs.any():
-        # Variance component: v'Pv of the group over its redundancy (Foerstner 1979).
+        # Variance component: v'Pv of the group over its redundancy (Foerstner's estimate).
         square = np.sum(parts_of_chi2[weighs]) + scatter[0]
         factor = float(np.sqrt(max(square, 0.0) / redundancy))
         factor_sd = float(1.0 / np.sqrt(2.0 * redundancy))
