@@ -16,7 +16,7 @@ from tankcal.geometry.rotations import apply_small_rotation
 
 TRIPLES = 120  # samples of three points
 JUDGES = 100  # points used to compare poses
-REFINING = 400  # points that refine a pose
+REFINING = 400  # points used to refine a pose
 REFINING_STEPS = 15
 FLAT = 0.02  # height over length below which three points lie on a line
 FEW = 8  # points below which several poses may fit
