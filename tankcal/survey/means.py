@@ -127,12 +127,12 @@ def contradictory_labels(label, averages):
     return np.where(torn[averages.group], separate, label)
 
 
-def average_repeated(one, label, warnings, *, name_of=None, apart=False):
+def average_repeated(observations, label, warnings, *, name_of=None, apart=False):
     """Replace repeated observations by their weighted means.
 
     Parameters
     ----------
-    one : Observations
+    observations : Observations
         Single readings with their Trace.
     label : ndarray of int, shape (n,)
         Equal for readings of the same value.
@@ -148,15 +148,15 @@ def average_repeated(one, label, warnings, *, name_of=None, apart=False):
     Observations
         In the order of their first readings; the Trace has number and scatter of the readings.
     """
-    if not len(one):
-        return one
-    angle = one.unit == "rad"
-    means = average_readings(label, one.value, one.sd, angle=angle)
-    warnings += _scatter_warnings(means, one.trace, name_of or _joined)
+    if not len(observations):
+        return observations
+    angle = observations.unit == "rad"
+    means = average_readings(label, observations.value, observations.sd, angle=angle)
+    warnings += _scatter_warnings(means, observations.trace, name_of or _joined)
     torn = contradictory_labels(label, means) if apart else label
     if torn is not label:
-        means = average_readings(torn, one.value, one.sd, angle=angle)
-    first = one.taken(means.first)
+        means = average_readings(torn, observations.value, observations.sd, angle=angle)
+    first = observations.taken(means.first)
     value, sd = (np.reshape(column, np.shape(first.value)) for column in (means.value, means.sd))
     trace = replace(first.trace, repeats=means.repeats, scatter=means.chi2.sum(axis=1))
     return replace(first, value=value, sd=sd, trace=trace)

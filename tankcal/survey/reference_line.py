@@ -142,6 +142,7 @@ class ReferenceLines:
     def by_collimation_m(self, offset):
         """Derivative of `radial_m` by the collimation, m/rad."""
         upwards = offset.level_m - self.reference_m
+        # In face 2 the plummet leans the opposite way.
         return upwards if offset.face == 2 else -upwards
 
 
@@ -236,6 +237,7 @@ def levels_of(reference_lines, offsets, collimations):
         From the bottom up; levels with too few lines are omitted.
     """
     rises = rises_of(reference_lines, offsets, collimations)
+    # Three lines determine radius and centre.
     levels = [
         _level(reference_lines, rises_of_level)
         for rises_of_level in rises

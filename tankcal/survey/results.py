@@ -217,6 +217,7 @@ class RepeatedReadings:
     @property
     def pooled_sd_mm(self):
         """Pooled standard deviation (2,) of one reading, weighted by degrees of freedom."""
+        # Weighted by n - 1 of each point: sum (n - 1) s^2 / sum (n - 1).
         return np.sqrt((self.count - 1) @ self.sd_mm**2 / np.sum(self.count - 1))
 
 
@@ -313,6 +314,7 @@ class Adjustment:
     @property
     def fixed(self) -> np.ndarray:
         """Mask (n, 3), True for held coordinates."""
+        # Held coordinates have no column in the adjustment.
         return self.adjusted.problem.layout.points[self.there] < 0
 
     @property
@@ -378,6 +380,7 @@ class Adjustment:
     @property
     def dof(self):
         """Degrees of freedom of the covariances: infinite unless residuals scaled them."""
+        # A priori covariances do not depend on an estimated variance factor.
         return np.inf if self.cov_scale == 1 else float(self.redundancy)
 
     def full_covariance_m2(self, names=None):

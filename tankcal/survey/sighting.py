@@ -251,6 +251,7 @@ def rays(azimuth_rad, zenith_rad):
     sin, cos = np.sin(azimuth_rad), np.cos(azimuth_rad)
     down, up = np.sin(zenith_rad), np.cos(zenith_rad)
     ray = np.column_stack([down * sin, down * cos, up])
+    # Derivatives of (sin z sin a, sin z cos a, cos z) by a and z.
     by_azimuth = np.column_stack([down * cos, -down * sin, np.zeros_like(up)])
     return ray, by_azimuth, np.column_stack([up * sin, up * cos, -down])
 
@@ -258,6 +259,7 @@ def rays(azimuth_rad, zenith_rad):
 def bias_by_incidence(cosine):
     """Bias function g = 1 / cos(incidence) - 1, shape (n,): 1 at 60 degrees, constant above 85
     degrees."""
+    # The clipped cosine keeps the bias finite at grazing incidence.
     return 1 / np.maximum(cosine, STEEPEST) - 1
 
 

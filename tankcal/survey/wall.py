@@ -54,6 +54,7 @@ def wall_points(adjustment, measurements, side):
         generatrix = tuple(targets.generatrix[i] for i in target_rows)
         numbers = tuple(targets.rows[i] for i in target_rows) if targets.rows else numbers
         offset = np.nan_to_num(np.asarray(targets.offset_m, dtype=float)[target_rows])
+        # Seen from inside, the target is on the inner side of the wall: the offset changes sign.
         xyz = move_to_wall(xyz, offset if side == "outside" else -offset)
     covariance = adjustment.full_covariance_m2(names)
     coordinates = (3 * indices[:, None] + np.arange(3)).ravel()
@@ -99,6 +100,7 @@ def move_to_wall(xyz_m, outwards_m):
                 count=len(xyz_m),
             )
         )
+    # Centring limits rounding in the circle fit.
     middle = xyz_m[:, :2].mean(axis=0)
     x, y, _ = taubin_circle(xyz_m[:, :2] - middle)
     away = xyz_m[:, :2] - middle - [x, y]

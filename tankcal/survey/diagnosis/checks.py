@@ -60,6 +60,7 @@ def find_disagreeing_checks(check_points, table):
         check_points.names, check_points.difference_m, check_points.sd_m, strict=True
     ):
         with np.errstate(divide="ignore", invalid="ignore"):
+            # An sd of 0 gives no test.
             away = np.nan_to_num(np.abs(difference) / sd, posinf=0.0)
         if name in table.point and away.max() > DISAGREE:
             k = int(away.argmax())

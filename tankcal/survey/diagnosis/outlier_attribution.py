@@ -180,6 +180,7 @@ def find_undecided_outliers(adjusted, removed, held, held_trace):
             "the same is true of {more} more readings that were set aside",
             more=len(problems) - LISTED,
         )
+        # Further cases are counted in one line.
         problems[LISTED:] = [Problem("job.toml", text, None, "adjustment.snooping")]
     return problems
 

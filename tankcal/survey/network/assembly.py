@@ -149,6 +149,7 @@ def assemble(survey):
         groups.append(group)
         sources.append("known beforehand")
         rows_of.append(np.arange(len(group)))
+    # Observations and state use the same centre, which keeps rounding small.
     state = _state(survey, centre, values)
     ordinary, blocks = len(groups), []
     for group, members in correlated_groups(survey, is_used, centre, state):
@@ -284,6 +285,7 @@ def _other_groups(survey, is_used, centre):
         for name in table.ties:
             keep &= is_used[getattr(table, name)]
         holds = table.exact
+        # Exact observations become conditions of the solver; a weight 1/0 would be infinite.
         if holds.any() and (sharp := (keep & holds & table.in_use).nonzero()[0]).size:
             taken = table.taken(sharp).relative(centre)
             exact.append(Held(taken, *taken.conditions(), number, sharp))
@@ -361,6 +363,7 @@ def _interior(survey):
         for place, group, numbers in assignments:
             for k in numbers:
                 if k not in place:
+                    # A parameter shared by photos has one index; its place depends on the scope.
                     place[k] = len(values)
                     values.append(settings.values[k])
                     free.append(settings.state[k] != "fixed")

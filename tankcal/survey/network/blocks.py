@@ -95,6 +95,7 @@ def correlated_groups(survey, used, centre, state):
         )
         acting = share > 0
         if not acting.any():
+            # The residuals of a rejected block are still compared.
             yield None, members
             continue
         root = np.sqrt(share[acting])
@@ -214,6 +215,7 @@ def observations_in_use(problem, solution, number, members, v):
     """
     places = np.flatnonzero(members.share > 0)
     if number is None:
+        # A rejected block contributes nothing, so all arrays are empty.
         none = np.zeros((0, 0))
         columns = np.zeros(0, dtype=int)
         return Acting(
@@ -238,14 +240,14 @@ def moves_of(solution, columns, jac):
     return np.vstack([changes, np.zeros((1, changes.shape[1]))])
 
 
-def conditional_expectation(members, part, mine, v, jac):
+def conditional_expectation(members, part, rejected, v, jac):
     """Compare rejected values with their expectation from the other values of the block.
 
     Parameters
     ----------
     members : Members
     part : Acting
-    mine : ndarray of int, shape (q,)
+    rejected : ndarray of int, shape (q,)
         Positions of the rejected values in the block.
     v, jac : ndarray
         Residuals (all,) and derivatives (all, K) of the block's values.
@@ -262,12 +264,13 @@ def conditional_expectation(members, part, mine, v, jac):
         Weights of the other values.
     """
     q, own = members.covariance, part.own
+    # Weight factors below 1 scale the covariance of the adjusted values.
     scale = np.sqrt(members.share[own])
-    between = q[np.ix_(own, mine)] / scale[:, None]
+    between = q[np.ix_(own, rejected)] / scale[:, None]
     # Conditional expectation of a normal distribution: Q_12 Q_22^-1 times the other residuals.
     share = np.linalg.solve(part.covariance, between).T if len(own) else between.T
-    off, away = v[mine] - share @ v[own], jac[mine] - share @ jac[own]
-    return off, away, q[np.ix_(mine, mine)] - share @ between, share
+    off, away = v[rejected] - share @ v[own], jac[rejected] - share @ jac[own]
+    return off, away, q[np.ix_(rejected, rejected)] - share @ between, share
 
 
 def test_values(problem, solution, number, members, delta0):
@@ -303,6 +306,7 @@ def test_values(problem, solution, number, members, delta0):
     sound = free > UNCONTROLLED * size
     root = np.sqrt(np.where(sound, free, 1.0))
     w[own] = np.where(sound, right / root, 0.0) / np.sqrt(members.share[own])
+    # MDB = delta0 / sqrt(c' R c); without redundancy it is infinite.
     mdb[own] = np.where(sound, delta0 / root, np.inf)
     external[own] = np.where(sound, delta0 * np.sqrt(np.maximum(size - free, 0.0)) / root, np.inf)
     if len(own):

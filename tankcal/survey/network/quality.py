@@ -17,6 +17,7 @@ def ellipsoid_factor(probability, dof=np.inf):
     sqrt(chi2(p; 3)), or sqrt(3 F(p; 3, dof)) with an estimated variance factor. The factor is 2.50,
     2.80, 3.37 for 90, 95, 99 %; the standard ellipsoid, factor 1, has a probability of 20 %.
     """
+    # Known variance factor: chi-square; estimated: F distribution.
     if np.isinf(dof):
         return float(np.sqrt(2 * gammaincinv(1.5, probability)))
     return float(np.sqrt(3 * fdtri(3, dof, probability)))
@@ -40,6 +41,7 @@ def ellipsoids(covariances_m2, probability=0.95, dof=np.inf):
         One column for each axis.
     """
     values, vectors = np.linalg.eigh(covariances_m2)
+    # Rounding may give tiny negative eigenvalues.
     axes = np.sqrt(np.maximum(values[:, ::-1], 0.0)) * ellipsoid_factor(probability, dof)
     return axes, vectors[:, :, ::-1]
 
@@ -265,6 +267,7 @@ def estimate_variance_components(survey, adjust, *, rounds=20, tolerance=0.01):
         }
         for source, factor in factors.items():
             total[source] = total.get(source, 1.0) * factor
+        # The factors multiply until the declared standard deviations agree with the residuals.
         if all(abs(factor - 1) < tolerance for factor in factors.values()):
             break
         survey = survey.with_sds(factors)

@@ -105,6 +105,7 @@ def reactions(problem, solution, fixed):
     held = np.flatnonzero(fixed & is_used[:, None] & (problem.layout.points < 0))
     unknowns, k = problem.model.unknowns, len(held)
     points = problem.layout.points.copy()
+    # Append a column for each held coordinate, to obtain its derivatives C.
     points.flat[held] = unknowns + np.arange(k)
     layout = replace(problem.layout, points=points)
     a = _rows_of(
@@ -118,6 +119,7 @@ def reactions(problem, solution, fixed):
         x, sound = _conditioned(problem, solution, layout, x)
     w = np.concatenate([np.zeros(0), *(values.ravel() for values in solution.normalised)])
     reaction, square, step = np.zeros(k), np.zeros(k), max(1, int(AT_ONCE / max(len(w), 1)))
+    # R is dense; work in slices to limit memory.
     for first in range(0, k, step):
         part = slice(first, first + step)
         r = c[:, part].toarray() + a @ x[:, part]
@@ -152,5 +154,6 @@ def _conditioned(problem, solution, layout, x):
     if not d_held.any():
         return x, np.ones(x.shape[1], dtype=bool)
     x = x - constraint_reactions(solution.cofactor)[2] @ d_held
+    # If the conditions cannot be met after a release, the coordinate cannot be released.
     remaining = np.abs(d_held + d @ x).max(axis=0, initial=0.0)
     return x, remaining < CONTRADICTED

@@ -121,6 +121,7 @@ class Residuals:
 
 def tau_limit(alpha, dof):
     """Two-sided critical value of Pope's tau distribution."""
+    # tau follows from Student's t with one degree of freedom fewer.
     t = -stdtrit(dof - 1, alpha / 2)
     return float(t * np.sqrt(dof) / np.sqrt(dof - 1 + t * t))
 
@@ -215,13 +216,14 @@ def _table(problem, solution, number, delta0):
         mdb = np.where(
             controlled, delta0 * np.where(share > 0, 1 / variance, variance) ** 0.5, np.inf
         )
+        # External reliability delta0 sqrt((1 - r) / r).
         hidden = np.where(controlled, delta0 * np.sqrt(np.maximum(1 - r, 0) / r), np.inf)
     sd, test = 1.0 / unweighted.weight, np.abs(w).max(axis=1)
     if group.rows == 2:
         test = _both(solution, number, v, jac, share, leverage, variance, test)
     return Residuals(
-        kind=group.kind, unit=group.unit, source=problem.sources[number], rows=problem.rows_of[number],
-        used=use > 0, residual=v * sd, sd=sd, redundancy=r, w=w, test_statistic=test, mdb=mdb * sd,
+        kind=group.kind, unit=group.unit, source=problem.sources[number],
+        rows=problem.rows_of[number], used=use > 0, residual=v * sd, sd=sd, redundancy=r, w=w, test_statistic=test, mdb=mdb * sd,
         external=hidden, changes=lambda: _changes(problem, solution, number, share),
     )  # fmt: skip
 
@@ -251,6 +253,7 @@ def _changes(problem, solution, number, share):
         for part, response in responses(solution.cofactor, columns, jac):
             largest_changes[part] = np.abs(response[points]).max(axis=0, initial=0.0)
         return share * largest_changes.reshape(jac.shape[:2]), None
+    # Change of the own point, exactly; the bound covers all other points.
     nearest = np.abs(own_responses(solution.cofactor, number, jac)).max(axis=2)
     reduced = solution.cofactor.leverage(number, jac)
     sd = np.einsum("nii->ni", solution.cofactor.block_cofactors)
@@ -278,6 +281,7 @@ def _exact_residuals(problem, solution, delta0):
     moves, k, sd = moves * levers, k * levers, sd * levers
     tested, first = sd > 0, 0
     with np.errstate(divide="ignore", invalid="ignore"):
+        # w = k / s_k, MDB = delta0 / s_k with the Lagrange multiplier k.
         w = np.where(tested, k / sd, 0.0)
         mdb = np.where(tested, delta0 / sd, np.inf)
     for held in problem.exact:
@@ -321,6 +325,7 @@ def _both(solution, group, v, jac, share, leverage, variance, single):
     between = np.where(share[:, 0] > 0, -share[:, 0] * between, between)
     a, d = variance.T
     determinant = a * d - between**2
+    # Quadratic form v' R^-1 v of a 2 x 2 matrix, before division by the determinant.
     square = d * v[:, 0] ** 2 + a * v[:, 1] ** 2 - 2 * between * v[:, 0] * v[:, 1]
     sound = determinant > UNCONTROLLED * np.maximum(a * d, UNCONTROLLED)
     square = np.maximum(square, 0.0) / np.where(sound, determinant, 1.0)

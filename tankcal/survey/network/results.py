@@ -18,6 +18,7 @@ from tankcal.survey.observations import KnownUnknowns
 def correlations(covariance):
     """Correlation matrix of a covariance (k, k); 0 where a variance is 0, 1 in the diagonal."""
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    # An infinite divisor turns rows without variance into zeros.
     size = np.where(sd > 0, sd, np.inf)
     matrix = covariance / np.outer(size, size)
     np.fill_diagonal(matrix, 1.0)
@@ -174,6 +175,7 @@ class Adjusted:
             for row in np.flatnonzero(group_of_known.index == index):
                 group = problem.model.groups[number].columns[row : row + 1]
                 jac = solution.cofactor.jacobians[number][row : row + 1]
+                # Response of all unknowns to a unit error of the whitened row, that is to one sd.
                 _, response = next(responses(solution.cofactor, group, jac))
                 effect += np.append(response[:, 0], 0.0)[columns]
         return effect
@@ -233,6 +235,7 @@ class Adjusted:
         """Covariances (n, k, k) of small groups (n, k) of reduced unknowns."""
         pair = columns[:, :, None], columns[:, None, :]
         cofactors = self.solution.cofactor.reduced_blocks(columns)
+        # Column -1 marks a fixed unknown, whose variance is 0.
         return np.where((pair[0] >= 0) & (pair[1] >= 0), cofactors, 0.0)
 
     @property
@@ -250,6 +253,7 @@ class Adjusted:
         q = self._small_blocks(self.problem.layout.photos)
         turn = np.zeros((len(q), 6, 6))
         turn[:, :3, :3] = np.eye(3)
+        # The unknowns are small rotations; the users' angles need their derivatives.
         turn[:, 3:, 3:] = angle_derivatives(rotation)
         covariance = turn @ q @ turn.transpose(0, 2, 1)
         return self.problem.centre_m + self._state.photo_xyz_m, angles_of(rotation), covariance

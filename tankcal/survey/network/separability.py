@@ -152,6 +152,7 @@ def _aside(problem, solution, source, row):
         v, jac = members.block.linearised(solution.unknowns)
         part = observations_in_use(problem, solution, number, members, v)
         off, away, unexplained, share = conditional_expectation(members, part, indices, v, jac)
+        # Whiten the difference, so that its covariance without the unknowns is I.
         root = np.linalg.cholesky(unexplained)
         e, jac, share = (solve_triangular(root, one, lower=True) for one in (off, away, share))
         columns = members.block.columns(problem.layout)
@@ -162,6 +163,7 @@ def _aside(problem, solution, source, row):
 def _make_aside(solution, e, jac, columns, *more):
     """The _Aside with Q J' and S^-1."""
     moves = moves_of(solution, columns, jac)
+    # S = I + J Q J' is the covariance of the whitened difference.
     inverse = np.linalg.inv(np.eye(len(e)) + jac @ moves[columns[0]])
     return _Aside(e, jac, columns[0], moves, inverse, *more)
 
@@ -182,6 +184,7 @@ def _correlated(problem, solution, number, members, aside):
             continue
         place = np.searchsorted(part.own, rows_of_observation)
         size = np.sqrt(np.sum(part.back[:, place] ** 2, axis=0) + np.sum(shift[:, place] ** 2, 0))
+        # Normalize each bias, so that thresholds on eigenvalues are comparable.
         c, d = part.back[:, place] / size, shift[:, place] / size
         cross = to_aside @ c + aside.inverse @ d
         right = c.T @ t + d.T @ aside.back
@@ -201,6 +204,7 @@ def _near(solution, table, number, b, aside):
     # one product of all rows takes a third of the time of many small ones
     flat = b.reshape(-1, b.shape[-1])
     v = table.residual / table.sd - (flat @ back).reshape(b.shape[:2])
+    # Diagonal of B S^-1 B': increase of the redundancy of j when i is restored.
     shared = np.einsum("rd,rd->r", flat @ inverse, flat).reshape(b.shape[:2])
     r = table.redundancy + shared
     squares = np.where(r > UNCONTROLLED, v**2 / np.maximum(r, UNCONTROLLED), 0.0)
@@ -208,6 +212,7 @@ def _near(solution, table, number, b, aside):
     near = np.flatnonzero(table.used & (square > WORTH))
     near = near[(b[near] != 0).any(axis=(1, 2))]
     near = near[np.argsort(-square[near], kind="stable")][:LOOKED_AT]
+    # The bound is cheap; exact covariances are computed for the remaining observations only.
     near = near[_may_explain(v[near], table.redundancy[near], shared[near].sum(axis=1), aside)]
     if not len(near):
         return
@@ -239,6 +244,7 @@ def _tests(v, cofactors, cross, aside):
     statistic, values = _square(v, cofactors)
     if statistic <= LIMITS[values]:
         return None
+    # The pseudo-inverse omits directions of j without redundancy.
     by_j = cross @ np.linalg.pinv(cofactors, rcond=UNCONTROLLED, hermitian=True)
     instead, values = _square(aside.back - by_j @ v, aside.inverse - by_j @ cross.T)
     return statistic, instead <= LIMITS[values]

@@ -99,6 +99,7 @@ def snoop(survey, *, critical=CRITICAL, test="w", robust=True, max_rounds=200, *
     adjusted, rounds = adjust(survey, **options), 1
     limit = _limit(adjusted, critical, test)
     suspects = _suspects(adjusted, limit)
+    # A survey without significant observations needs no robust start.
     if robust and np.nanmax(candidates.statistic(adjusted)[1], initial=0) > limit:
         try:
             thinner, rounds = _robust(candidates, adjusted, critical, options)
@@ -111,6 +112,7 @@ def snoop(survey, *, critical=CRITICAL, test="w", robust=True, max_rounds=200, *
 
     def readjust(now, goes, comes):
         share = candidates.shares(now.survey)
+        # A restored observation takes part fully, a rejected one not at all.
         share[comes], share[goes] = 1.0, 0.0
         return adjust(
             candidates.with_shares(start_from_adjusted(now.survey, now), share), **options
@@ -145,11 +147,11 @@ def _limit(adjusted, critical, test):
     return adjusted.sigma0 * tau_limit(alpha, adjusted.dof)
 
 
-def kept_of(one, kept):
+def kept_of(observations, kept):
     """Mask (n,) of observations from readings that are kept, (file, row) each."""
-    trace = one.trace
+    trace = observations.trace
     if trace is None:
-        return np.zeros(len(one), dtype=bool)
+        return np.zeros(len(observations), dtype=bool)
     return np.array([(trace.file, row) in kept for row in trace.rows], dtype=bool)
 
 
@@ -212,6 +214,7 @@ def _robust(candidates, adjusted, critical, options):
         if turn > HUBER_ROUNDS and change < 0.02:
             break
     away, share = candidates.statistic(adjusted)[1] / size, candidates.shares(survey)
+    # The final decision uses the test alone: weights between 0 and 1 become 0 or 1.
     share = np.where(np.isnan(away), share, away <= critical)
     return candidates.with_shares(survey, share), turn + 2
 

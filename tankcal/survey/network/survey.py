@@ -218,6 +218,7 @@ class Survey:
         for table in self.tables.values():
             for name in table.ties:
                 count += table.rows * np.bincount(table.of_used(name), minlength=len(count))
+        # A fixed coordinate counts like an observed one.
         return count if self.fixed is None else count + self.fixed.sum(axis=1)
 
     def without(self, sources):
@@ -227,6 +228,7 @@ class Survey:
         """
         kept = [i for i in range(len(self.observations)) if i not in set(sources)]
         number = np.full(len(self.observations), -1)
+        # Blocks refer to tables by number, so map old numbers to new ones; -1: removed.
         number[kept] = np.arange(len(kept))
         blocks = []
         for block in self.correlated:
@@ -257,6 +259,7 @@ class Survey:
         if images is not None:
             images = replace(images, sd=images.sd * factors.get(IMAGES, 1.0))
         blocks = tuple(
+            # A covariance scales with the product of both factors.
             replace(item, covariance=item.covariance * np.outer(size, size))
             for item in self.correlated
             for size in [np.array([factors.get(i, 1.0) for i in item.source.tolist()])]

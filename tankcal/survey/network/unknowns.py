@@ -28,6 +28,7 @@ def eliminated_points(survey, others, is_used, exact):
             eliminated[getattr(held.conditions, name)] = False
     if survey.fixed is not None:
         eliminated &= ~survey.fixed.any(axis=1)
+    # Two eliminated points in one row would couple their blocks.
     neighbours = {}
     for group in others:
         if len(group.ties) > 1:
@@ -122,16 +123,16 @@ def name_of_exact(survey, exact, row):
     raise IndexError(row)
 
 
-def told(survey, one, row):
+def told(survey, observations, row):
     """Name of an observation in messages: its kind and its points."""
-    ends = [name for name in ("origin", "start", "end", "point") if name in one.ties]
-    names = [survey.points[getattr(one, name)[row]] for name in ends]
-    if hasattr(one, "photo"):
-        names.insert(0, survey.photos.names[one.photo[row]])
-    text = f"{one.kind} {' - '.join(names)}".rstrip()
-    if hasattr(one, "element"):
-        return f"{text} {ELEMENTS[one.element[row]]}"
-    return f"{text} {'xyz'[one.axis[row]]}" if hasattr(one, "axis") else text
+    ends = [name for name in ("origin", "start", "end", "point") if name in observations.ties]
+    names = [survey.points[getattr(observations, name)[row]] for name in ends]
+    if hasattr(observations, "photo"):
+        names.insert(0, survey.photos.names[observations.photo[row]])
+    text = f"{observations.kind} {' - '.join(names)}".rstrip()
+    if hasattr(observations, "element"):
+        return f"{text} {ELEMENTS[observations.element[row]]}"
+    return f"{text} {'xyz'[observations.axis[row]]}" if hasattr(observations, "axis") else text
 
 
 def name_of(survey, layout, table, column):
@@ -161,6 +162,7 @@ NAMED = 5  # names listed
 def in_words(survey, layout, table, directions):
     """Describe the unknowns in undetermined directions (unknowns, d)."""
     size = np.append(np.sqrt(np.sum(directions**2, axis=1)), 0.0)
+    # Small components of a singular vector are rounding, not participation.
     size[size < SHARE * size.max()] = 0.0
     parts, is_listed = [], np.zeros(len(size), dtype=bool)
     photos = () if survey.photos is None else survey.photos.names

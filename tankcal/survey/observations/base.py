@@ -176,6 +176,7 @@ class Observations:
     def conditions(self):
         """Exact observations as conditions without sd, and the observation number (k,) of each
         row."""
+        # Conditions have no weight: the unit sd leaves the equation unscaled.
         return replace(self, sd=np.ones(np.shape(self.value)), use=None), np.arange(len(self))
 
     def lever(self, state):
@@ -256,6 +257,7 @@ class Observations:
         empty."""
         with_derivatives = len(jac) > 0
         computed, derivatives = self.computed(state, with_derivatives)
+        # Whitening: division by the sd gives rows with unit variance.
         np.multiply(self.difference(computed), self.weight, out=w)
         if with_derivatives:
             np.multiply(derivatives, self.weight[:, :, None], out=jac)

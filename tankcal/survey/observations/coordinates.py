@@ -75,6 +75,7 @@ class SystemCoordinates(Observations):
         jac[:, 1, 3], jac[:, 1, 5] = -z, x
         jac[:, 2, 3], jac[:, 2, 4] = y, -x
         jac[:, :, 6:9] = np.eye(3)
+        # The derivative by the scale is the rotated vector itself.
         jac[:, :, 9] = turned
         return all_three[rows, self.axis, None], jac[rows, self.axis][:, None, :]
 
@@ -111,6 +112,7 @@ class HeightDifferences(_Differences):
     def computed(self, state, derivatives):
         """The differences (n, 1)."""
         computed = state.xyz_m[self.end, 2:] - state.xyz_m[self.start, 2:]
+        # Derivatives by x, y, z of end, then of start.
         row = np.array([0.0, 0, 1, 0, 0, -1])
         return computed, np.tile(row, (len(self), 1, 1)) if derivatives else None
 
@@ -136,6 +138,7 @@ class PlumbLines(_Differences):
     def computed(self, state, derivatives):
         """Differences in x and y (n, 2)."""
         computed = state.xyz_m[self.end, :2] - state.xyz_m[self.start, :2]
+        # Only x and y enter: first two rows of I and -I.
         rows = np.hstack([np.eye(2, 3), -np.eye(2, 3)])
         return computed, np.tile(rows, (len(self), 1, 1)) if derivatives else None
 

@@ -75,6 +75,7 @@ class Correlated(Observations):
 
     def whitened(self, values):
         """L^-1 times values (m, ...)."""
+        # Solving with L is more accurate than multiplying by its inverse.
         return scipy.linalg.solve_triangular(self._root, values, lower=True)
 
     def linearised(self, state):

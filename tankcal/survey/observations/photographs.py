@@ -129,6 +129,7 @@ class PhotoOrientation(Observations):
         """Computed minus observed; angles reduced to -pi to pi."""
         misclosure = super().difference(computed)
         angle = np.asarray(self.element) > 2
+        # The argument of exp(i x) is x reduced to one turn.
         misclosure[angle] = np.angle(np.exp(1j * misclosure[angle]))
         return misclosure
 
@@ -183,6 +184,7 @@ class PhotoRotation(Observations):
         # Each angle rotates about its own axis: covariance = sum of s^2 a a' over the three axes.
         covariance = np.einsum("nij,nj,nkj->nik", turns, np.square(self.sd), turns)
         variances, axes = np.linalg.eigh(covariance)
+        # (0.1 smallest sd)^2, the limit stated above.
         floor = 0.01 * np.square(self.sd).min(axis=1, keepdims=True)
         share = 1.0 if self.use is None else np.sqrt(self.use)[:, None]
         root = share / np.sqrt(np.maximum(variances, floor))

@@ -86,6 +86,7 @@ class Distances(Sights):
     def computed(self, state, derivatives):
         """The readings (n, 1)."""
         d = self.line(state)
+        # Without the height difference the derivative by z vanishes as well.
         if self.horizontal:
             d[2] = 0.0
         s = np.sqrt(np.einsum("kn,kn->n", d, d))
@@ -148,6 +149,7 @@ class Azimuths(_Angles):
 
     def off_frame(self, d):
         """Misfits in metres, a list of (n,), from differences d (n, 3) of the ends."""
+        # The angular misfit becomes a length across the line.
         away = np.hypot(d[:, 0], d[:, 1])
         return [d[:, 0] - away * np.sin(self.value), d[:, 1] - away * np.cos(self.value)]
 
@@ -180,6 +182,7 @@ class Directions(_Angles):
         computed = (value - self.nuisance(state)[0])[:, None]
         if not derivatives:
             return computed, None
+        # The orientation enters with derivative -1.
         turn = np.full((len(self), 1, 1), -1.0)
         return computed, np.concatenate([self.of_ends(derivative), turn], axis=2)
 
@@ -250,9 +253,11 @@ class VerticalAngles(_Angles):
         """The angles (n, 1)."""
         x, y, z = self.line(state)
         p2 = x * x + y * y
+        # Curvature lowers the target by bend p^2.
         p, z = np.sqrt(p2), z - self.bend_per_m * p2
         s2 = p2 + z * z
         value = np.arctan2(z, p)
+        # Derivatives of atan2(h, p) by z and p; h depends on p through the curvature.
         of_z, of_p = p / s2, -z / s2 - 2 * self.bend_per_m * p2 / s2
         sign = -1.0 if self.zenith else 1.0
         computed = (np.pi / 2 - value if self.zenith else value)[:, None]

@@ -108,4 +108,5 @@ class Trace:
     def repeated(self):
         """Chi-square (n,) and degrees of freedom (n,) of the averaged readings."""
         scatter = np.zeros(len(self.reading)) if self.scatter is None else self.scatter
+        # k readings about their mean have k - 1 degrees of freedom per value.
         return scatter, (self.repeats - 1) * self.source.values[self.reading]

@@ -47,6 +47,7 @@ def blind_piece(sights, waiting, points, rng, seed=0):
     judged.sort(key=lambda candidate: (-candidate[0], candidate[1]))
     third, misfit, pair, piece = judged[0]
     if not third:
+        # Without a third photo, two poses of the same pair cannot be separated.
         alike = [candidate for candidate in judged if candidate[2] == pair]
         if len(alike) > 1:
             return None, (

@@ -180,6 +180,7 @@ def _turned(turn, here, there, centre, onto):
     scale."""
     before = np.linalg.norm(here - centre, axis=1)
     after = np.linalg.norm(there - onto, axis=1)
+    # Places at the centre give no ratio of distances.
     apart = before > 1e-6 * max(before.max(initial=0.0), 1e-30)
     scale = float(np.median(after[apart] / before[apart])) if apart.any() else 1.0
     if not scale > 0:
@@ -193,6 +194,7 @@ def _polished(motion, here, there):
         return motion
     for _ in range(5):
         off = np.linalg.norm(motion.of(here) - there, axis=1)
+        # Cauchy weights: places beyond the misfit lose influence.
         weight = 1 / (1 + (off / max(2 * motion.misfit_m, 1e-12)) ** 2)
         spread = np.linalg.svd((here - np.average(here, axis=0, weights=weight))
                                * np.sqrt(weight)[:, None], compute_uv=False)  # fmt: skip

@@ -88,6 +88,7 @@ class Plan:
 
 def medians(groups, values):
     """Sorted groups (k,), and the median of the values (n,) of each."""
+    # Sorted by group, then by value: the median is in the middle of each group.
     order = np.lexsort([values, groups])
     groups, values = groups[order], values[order]
     distinct, first, count = np.unique(groups, return_index=True, return_counts=True)
@@ -140,6 +141,7 @@ def _distances(survey, groups):
     parts = []
     for item in groups:
         if isinstance(item, Distances):
+            # Invert reading = (1 + scale) true + offset.
             length = (item.value - offset[item.instrument]) / (1 + scale[item.instrument])
             flat = np.full(len(item), item.horizontal)
             parts.append((item.start, item.end, length, flat, _rise(item)))
@@ -151,6 +153,7 @@ def _slopes(groups):
     parts = []
     for item in groups:
         if isinstance(item, VerticalAngles):
+            # Zenith angles become angles above the horizon.
             slope = np.pi / 2 - item.value if item.zenith else item.value
             bend = np.full(len(item), item.bend_per_m)
             parts.append((item.start, item.end, slope, _rise(item), bend))

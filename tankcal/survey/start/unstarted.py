@@ -92,6 +92,7 @@ def refuse_missing(survey, sights, xyz_m, piece, sets, reasons, why=lambda point
             *(item for item in reasons if item),
         ]
         raise kind(join_with_semicolons(texts))
+    # Points without observations need finite coordinates only.
     middle = np.nanmean(xyz_m, axis=0) if known.any() else np.zeros(3)
     return np.where(np.isnan(xyz_m), middle, xyz_m)
 
