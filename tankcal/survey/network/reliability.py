@@ -223,8 +223,9 @@ def _table(problem, solution, number, delta0):
         test = _both(solution, number, v, jac, share, leverage, variance, test)
     return Residuals(
         kind=group.kind, unit=group.unit, source=problem.sources[number],
-        rows=problem.rows_of[number], used=use > 0, residual=v * sd, sd=sd, redundancy=r, w=w, test_statistic=test, mdb=mdb * sd,
-        external=hidden, changes=lambda: _changes(problem, solution, number, share),
+        rows=problem.rows_of[number], used=use > 0, residual=v * sd, sd=sd, redundancy=r, w=w,
+        test_statistic=test, mdb=mdb * sd, external=hidden,
+        changes=lambda: _changes(problem, solution, number, share),
     )  # fmt: skip
 
 
