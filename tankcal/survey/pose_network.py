@@ -282,7 +282,7 @@ class PoseNetwork:
         worst = np.argmax(np.nan_to_num(w, nan=-1.0), axis=1) if len(w) else np.zeros(0, dtype=int)
         return w[every, worst], mdb.max(axis=1)
 
-    # what is wrong
+    # wrong names, frames and units
 
     def refuse_misnamed(self):
         """Raise SolutionError if a mirror, a unit or two exchanged names explain the misfit."""

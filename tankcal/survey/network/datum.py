@@ -1,4 +1,5 @@
-"""The seven rigid motions and scale of a survey, and those that no observation determines.
+"""The seven motions of a survey (six rigid motions and scale), and those that no observation
+determines.
 
 Translations, rotations about the axes through the centre, and scale move points, projection
 centres, circle orientations and further systems together. No image, angle or ratio of distances

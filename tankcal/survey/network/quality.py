@@ -263,7 +263,7 @@ def estimate_variance_components(survey, adjust, *, rounds=20, tolerance=0.01):
         factors = {
             source: float(np.sqrt(square / redundancy))
             for source, (square, redundancy) in merged.items()
-            if redundancy > 1 and square > 0  # residuals of 0 say nothing of an sd
+            if redundancy > 1 and square > 0  # zero residuals give no estimate
         }
         for source, factor in factors.items():
             total[source] = total.get(source, 1.0) * factor

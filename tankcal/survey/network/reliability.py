@@ -203,7 +203,7 @@ def _table(problem, solution, number, delta0):
     jac = np.empty((*v.shape, columns.shape[1]))
     unweighted.fill(solution.unknowns, v, jac)
     leverage, aside = solution.cofactor.leverage(number, jac), use == 0
-    # Rejected rows are outside the range of the adjusted ones, so the datum contributes, too.
+    # Rejected rows are outside the range of the adjusted ones, so the datum adds to their leverage.
     leverage[aside] += solution.cofactor.leverage_of_datum(columns[aside], jac[aside])
     share = use[:, None]
     # Redundancy number: one minus leverage, with the weight factor of the row.

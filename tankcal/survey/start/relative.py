@@ -207,7 +207,8 @@ def _in_front(rotation, base, f1, f2):
 
 
 def _refined(rotation, base, f1, f2):
-    """Refine rotation and base by Gauss-Newton with decreasing weights; return the error, too."""
+    """Refine rotation and base by Gauss-Newton with decreasing weights; return them and the
+    error."""
     error = np.inf
     for _ in range(REFINING_STEPS):
         off, a = _linearised(rotation, base, f1, f2)

@@ -36,7 +36,7 @@ def repair_photos(sights, piece, held, rng, wall=None):
         bad &= piece.oriented & ~held
         if not bad.any():
             return piece
-        # Points from photos may be spoilt by the bad ones, so they are recomputed, too.
+        # Points from photos may be spoilt by the bad ones, so they are recomputed as well.
         less = replace(
             piece,
             xyz_m=np.where(piece.by_photos[:, None], np.nan, piece.xyz_m),
