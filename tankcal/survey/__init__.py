@@ -1,6 +1,6 @@
-"""Surveys: from what was measured on site to adjusted points with their covariance.
+"""Surveys: from the measurements on site to adjusted points with their covariance.
 
-Names are resolved when they are first used: reading a job needs its measurements, not the solver.
+Names are imported on first use, so that reading a job imports the measurements but not the solver.
 """
 
 from importlib import import_module

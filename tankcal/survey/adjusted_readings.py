@@ -1,4 +1,4 @@
-"""What became of each reading in the adjustment: one `Reading`, and all of them by columns."""
+"""State of each reading after the adjustment: one `Reading`, and all readings as columns."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -13,37 +13,38 @@ class Reading:
     Attributes
     ----------
     kind : str
-        As the observations name it: "image coordinate", "distance", "direction", ...
+        Kind of observation: "image coordinate", "distance", "direction", ...
     ids : tuple
         Names, such as ("photo 1", "215") or ("A", "B").
     element : str
-        "x" or "y", "omega", ...; "" where there is only one.
+        "x" or "y", "omega", ...; "" where the observation has a single value.
     file, row
-        Where it was read; of averaged readings the first row; "" and None: no file.
+        File and row of the reading; the first row of averaged readings; "" and None without a file.
     repeats : int
-        Readings that were averaged.
+        Number of readings averaged.
     unit : str
-        Of value, residual, sd, mdb: "mm" (images), "m", "rad" or "" (weighted unknowns).
+        Unit of value, residual, sd and mdb: "mm" (images), "m", "rad" or "" (weighted unknowns).
     value : float
-        Observed, as adjusted (after averaging and corrections).
+        Observed value as adjusted (after averaging and corrections).
     residual : float
         Computed minus observed.
     sd : float
-        A priori.
+        A priori standard deviation.
     redundancy : float
-        0 to 1.
+        Redundancy number, 0 to 1.
     w : float
-        Baarda's test quantity.
+        Baarda's test statistic.
     tau : float
-        Pope's: w over sigma0 (nan: no redundancy).
+        Pope's test statistic, w over sigma0 (nan: no redundancy).
     mdb : float
-        Minimal detectable bias; inf: nothing controls it.
+        Minimal detectable bias; inf: the reading is not controlled.
     effect_m : float
-        Largest change of a point's coordinates by an undetected bias of that size; inf as well.
+        Largest change of a point's coordinates caused by an undetected bias of size mdb, m; inf
+        where mdb is inf.
     removed : bool
-        True: set aside by data snooping; residual and w are then those that it would have.
+        True: rejected by data snooping; residual and w are then predicted from the other readings.
     check : bool
-        True: it was only compared; w is then its difference over the sd of that.
+        True: compared only; w is then the difference over its standard deviation.
     """
 
     kind: str
@@ -66,15 +67,14 @@ class Reading:
 
 
 class Readings(Sequence):
-    """A sequence of `Reading`, kept by columns: each is made when it is asked for.
+    """Sequence of `Reading`, stored as columns; each `Reading` is created on access.
 
-    A survey may have 200 000; what looks at all of them looks at columns.
+    A survey may have 200 000 readings, so code that examines all of them uses the columns.
 
     Attributes
     ----------
     columns : dict
-        {attribute of a Reading: its values, ndarray (n,)}: of floats, bool, whole numbers, or
-        objects.
+        {attribute of a Reading: its values, ndarray (n,)} of floats, bool, integers or objects.
 
     Examples
     --------
@@ -89,46 +89,46 @@ class Readings(Sequence):
 
     @classmethod
     def of(cls, rows):
-        """Those of some Reading rows."""
+        """Create `Readings` from a sequence of `Reading`."""
         return cls(
             {
-                one.name: np.fromiter((getattr(row, one.name) for row in rows), _TYPES[one.type],
-                                      len(rows))
-                for one in fields(Reading)
+                item.name: np.fromiter((getattr(row, item.name) for row in rows), _TYPES[item.type],
+                                       len(rows))
+                for item in fields(Reading)
             }
         )  # fmt: skip
 
     @classmethod
     def joined(cls, parts):
-        """Those of some Readings, one after the other."""
+        """Concatenate several `Readings`."""
         return cls(
             {
-                one.name: np.concatenate([part.columns[one.name] for part in parts])
-                for one in fields(Reading)
+                attribute.name: np.concatenate([part.columns[attribute.name] for part in parts])
+                for attribute in fields(Reading)
             }
         )
 
-    def where(self, chosen):
-        """The Readings that a mask, numbers or a slice choose."""
-        return Readings({name: column[chosen] for name, column in self.columns.items()})
+    def where(self, selection):
+        """Select `Readings` by a mask, indices or a slice."""
+        return Readings({name: column[selection] for name, column in self.columns.items()})
 
     @property
     def removed(self):
-        """(n,) True: was set aside."""
+        """Mask (n,), True where the reading was rejected."""
         return self.columns["removed"]
 
     @property
     def check(self):
-        """(n,) True: was only compared."""
+        """Mask (n,), True where the reading was compared only."""
         return self.columns["check"]
 
     @property
     def hold(self):
-        """(n,) True: a value that holds exactly; it has no redundancy, but a reaction."""
+        """Mask (n,), True for values held exactly; these have no redundancy, but a reaction."""
         return (self.columns["sd"] == 0) & ~self.check & ~self.removed
 
     def are(self, *kinds):
-        """(n,) whether they are of these kinds."""
+        """Mask (n,), True for readings of the given kinds."""
         return np.isin(self.columns["kind"], kinds)
 
     def __len__(self):
@@ -137,6 +137,7 @@ class Readings(Sequence):
     def __getitem__(self, number):
         if isinstance(number, slice):
             return self.where(number)
+        # range() resolves negative numbers and raises IndexError beyond the end.
         number = range(len(self))[number]
         return next(iter(self.where(slice(number, number + 1))))
 

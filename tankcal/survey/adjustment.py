@@ -1,4 +1,4 @@
-"""A survey adjusted: from the measurements as they were read to points with their covariance."""
+"""Adjustment of a survey: from the measurements as read to points with their covariance."""
 
 from dataclasses import replace
 from functools import partial
@@ -33,29 +33,36 @@ from tankcal.survey.rows import gone_with_their_points, readings_of
 from tankcal.survey.start.unstarted import SeveralPlacesError
 from tankcal.survey.start_values import add_start_values, mirrored_targets, started_like
 
-SUSPICIOUS = 4.0  # sigma0 above which whole files are doubted
-SEVERAL = 0.05  # share of the values set aside, above which they are as well
-SPARED = 2  # values fewer set aside, from which a held coordinate is doubted and not they
-NOISELESS = 1e-6  # sigma0 of rounding alone: what was measured scatters more
-TRIED = 25  # iterations of a survey that is only supposed
-FILES = ("image_points.csv", "photos.csv", "control.csv")  # first in the list of readings
+SUSPICIOUS = 4.0  # sigma0 above which whole files are suspected
+SEVERAL = 0.05  # share of rejected values above which whole files are suspected
+SPARED = 2  # fewer rejected values that make a held coordinate the suspect
+NOISELESS = 1e-6  # sigma0 caused by rounding alone; measured values scatter more
+TRIED = 25  # iterations allowed for a trial adjustment of a supposed mistake
+# these files come first in the list of readings
+FILES = ("image_points.csv", "photos.csv", "control.csv")
 
 
 def adjust_survey(measurements, progress=None):
-    """Adjust everything that was measured on site: the Adjustment of job.Measurements.
+    """Adjust all measurements made on site.
 
     Parameters
     ----------
-    progress : optional
-        progress(text) is called with what is being done.
+    measurements : Measurements
+        Checked tables of the survey.
+    progress : callable, optional
+        progress(text) is called before each step.
+
+    Returns
+    -------
+    Adjustment
 
     Raises
     ------
     InputError
-        For what cannot be meant.
+        If an input is contradictory or incomplete.
     SolutionError
-        In words, with a likely cause where one is found, when the survey does not determine what is
-        asked for.
+        If the survey does not determine the unknowns. The message names a likely cause where the
+        search for mistakes identifies one.
     """
     progress = progress or (lambda text: None)
 
@@ -63,21 +70,39 @@ def adjust_survey(measurements, progress=None):
         return _adjusted(measured, progress, like=like)
 
     try:
-        found, measurements, depth = adjust_in_depth(measurements, adjusted, progress)
+        result, measurements, depth = adjust_in_depth(measurements, adjusted, progress)
     except SolutionError as error:
         if not measurements.settings.explain or isinstance(error, SeveralPlacesError):
             raise
         progress(message("looking_for_faults", "looking for mistakes in the input"))
-        told = _why_not(measurements, str(error))
-        if not told:
+        causes = _why_not(measurements, str(error))
+        if not causes:
             raise
-        raise SolutionError(*error.args, *(one.text for one in told)) from error
+        raise SolutionError(*error.args, *(cause.text for cause in causes)) from error
+    # Diagnoses follow the last round of the depth correction only: intermediate rounds are not
+    # reported.
     progress(message("judging_residuals", "testing the residuals"))
-    return replace(_complete(*found, measurements), depth=depth)
+    return replace(_complete(*result, measurements), depth=depth)
 
 
 def _adjusted(measurements, progress, snooping=None, most=100, like=None):
-    """Searched, Gathered and Frame of measurements; like: network.Adjusted that is close to it."""
+    """Adjust measurements with a search for blunders.
+
+    Parameters
+    ----------
+    measurements : Measurements
+    progress : callable
+    snooping : bool, optional
+        Overrides settings.snooping.
+    most : int
+        Largest number of iterations.
+    like : network.Adjusted, optional
+        A similar adjustment, which supplies the start values.
+
+    Returns
+    -------
+    tuple of (Searched, Gathered, Frame)
+    """
     gathered = gather(measurements)
     if not gathered.survey.points:
         nothing = message("nothing_observed", "the survey has no observations to adjust")
@@ -91,47 +116,54 @@ def _adjusted(measurements, progress, snooping=None, most=100, like=None):
     )
     survey = None if like is None else started_like(like, gathered, measurements)
     survey = survey or add_start_values(gathered, measurements)
+    # Exchanged names show at the start values, where the residuals are still large; the adjustment
+    # would spread them over all points.
     swapped = swapped_at_start(survey, gathered.known)
     if swapped:
         raise SolutionError("\n".join(map(str, swapped)))
     frame = make_frame(survey, gathered, measurements.settings)
     progress(message("adjusting", "adjusting {count} observations", count=_count(frame.survey)))
-    wanted = measurements.settings.snooping if snooping is None else snooping
-    gross = gross_readings(frame.survey) if wanted else None
+    is_snooping = measurements.settings.snooping if snooping is None else snooping
+    gross = gross_readings(frame.survey) if is_snooping else None
     options = {**frame.options, "max_iterations": most}
     return search_blunders(frame.survey, options, gross), gathered, frame
 
 
 def _tried(measurements, snooping=False, like=None):
-    """network.Adjusted and Gathered of measurements that are only supposed."""
+    """Adjust trial measurements; return network.Adjusted and Gathered."""
     search, gathered, _ = _adjusted(measurements, lambda text: None, snooping, TRIED, like)
     return search.adjusted, gathered
 
 
 def _why_not(measurements, message):
-    """Problem rows that may explain why a survey could not be adjusted."""
+    """Return Problem rows with likely reasons for a failed adjustment, most specific first."""
+    # These messages already name their cause.
     if "datum defect" in message or MIRROR in message:
         return []
-    lost = photos_that_do_not_fit(measurements, message, _tried)
+    photo_problems = photos_that_do_not_fit(measurements, message, _tried)
     return (
-        lost
+        photo_problems
         or likely_mistake(measurements, np.inf, _tried, message)
         or wrong_control(measurements, np.inf, _tried)[0]
     )
 
 
 def _count(survey):
-    return sum(len(one) * one.rows for one in survey.tables.values())
+    """Number of values observed in a survey."""
+    return sum(len(table) * table.rows for table in survey.tables.values())
 
 
 def _complete(search, gathered, frame, measurements):
-    """The Adjustment of what was adjusted."""
+    """Assemble the Adjustment from the adjusted network, its diagnoses and its covariance scale."""
     adjusted = search.adjusted
     scale, warnings = _cov_scale(adjusted, measurements.settings)
     warnings = [*gathered.warnings, *frame.warnings, *search.warnings, *warnings]
+    # Residuals of held coordinates are reactions: they test control that has no redundancy.
     held = reactions(adjusted.problem, adjusted.solution, frame.tested & ~gathered.idle)
     of_held = held_trace(gathered.known, adjusted.survey.points)
     readings, groups = readings_of(adjusted, held.residuals(adjusted.problem), of_held)
+    # A rejected reading whose point is lost appears in no table of residuals; it is listed
+    # separately.
     gone = gone_with_their_points(adjusted, search.removed)
     removed = sorted([*readings.where(readings.removed), *gone], key=lambda one: -abs(one.w))
     checks = check_readings(adjusted, gathered.checks, scale)
@@ -142,6 +174,8 @@ def _complete(search, gathered, frame, measurements):
     warnings += [_kept(one, adjusted.survey) for one in search.needed if one.w > CRITICAL]
     diagnoses = _diagnoses(adjusted, readings, groups, gathered, measurements)
     doubts = _causes(adjusted, readings, gathered, measurements, diagnoses)
+    # If the whole survey is in doubt, outliers in readings say little; only control is examined
+    # further.
     rays, others = [], [one for one in search.removed if one.source != IMAGES]
     if doubts:
         others = [one for one in others if one.kind.startswith("control coordinate")]
@@ -153,6 +187,8 @@ def _complete(search, gathered, frame, measurements):
     doubts += find_undecided_outliers(adjusted, others, held, of_held)
     warnings = [*doubts, *warnings, *diagnoses, *rays]
     known = gathered.known
+    # Points that hold the datum are no independent check. With datum = control, all weighted and
+    # fixed control holds it.
     acting = frame.held
     if measurements.settings.datum == "control":
         acting = np.isfinite(known.xyz_m) & np.isfinite(known.sd_m)
@@ -179,7 +215,7 @@ def _complete(search, gathered, frame, measurements):
 
 
 def _kept(one, survey):
-    """Problem of a reading that disagrees, but cannot be spared."""
+    """Problem of a reading that disagrees but cannot be removed."""
     trace = survey.table(one.source).trace
     text = message(
         "disagreeing_but_kept",
@@ -199,37 +235,45 @@ def _lost(measurements, name, why):
 
 
 def _diagnoses(adjusted, readings, groups, gathered, measurements):
-    """Problem rows: what the result says about mistakes in the input."""
-    found = diagnose(adjusted, readings, groups, gathered.known)
-    found += names_alike(gathered.lost, adjusted.survey.points) + same_place(adjusted)
-    found += [
+    """Problem rows: mistakes in the input that the adjusted values indicate."""
+    problems = diagnose(adjusted, readings, groups, gathered.known)
+    problems += names_alike(gathered.lost, adjusted.survey.points) + same_place(adjusted)
+    problems += [
         Problem("job.toml", text, None, "adjustment") for text in find_hardly_determined(adjusted)
     ]
-    found += mirrored_targets(adjusted.xyz_m, adjusted.survey.points, measurements)
-    return found
+    problems += mirrored_targets(adjusted.xyz_m, adjusted.survey.points, measurements)
+    return problems
 
 
 def _causes(adjusted, readings, gathered, measurements, diagnoses):
-    """Problem rows: what is wrong with the whole rather than with single readings."""
+    """Problem rows: mistakes that affect the whole survey rather than single readings."""
     if not measurements.settings.explain:
         return []
     gone = count_set_aside(adjusted.survey)
-    told = find_one_sided_losses(readings, gathered.known)
-    if not (told or adjusted.sigma0 > SUSPICIOUS or gone > SOME * len(readings)):
+    one_sided = find_one_sided_losses(readings, gathered.known)
+    if not (one_sided or adjusted.sigma0 > SUSPICIOUS or gone > SOME * len(readings)):
         return strained(readings, gathered.known)
+    # Trials start from this solution, which is close to theirs.
     close, sigma0 = partial(_tried, like=adjusted), adjusted.sigma0
+    # The search for blunders lowers sigma0. The test needs sigma0 of all readings, so it adjusts
+    # again without snooping.
     if gone:
         try:
             sigma0 = close(measurements)[0].sigma0
         except SolutionError:
             sigma0 = np.inf
-    bad = told or adjusted.sigma0 > SUSPICIOUS or gone > SEVERAL * len(readings)
-    bad = bad and sigma0 > SUSPICIOUS and not any(MIRROR in one.expected for one in diagnoses)
+    bad = one_sided or adjusted.sigma0 > SUSPICIOUS or gone > SEVERAL * len(readings)
+    bad = (
+        bad and sigma0 > SUSPICIOUS and not any(MIRROR in problem.expected for problem in diagnoses)
+    )
+    # A mirror image has its own diagnosis; trials of other mistakes cannot remove it.
     misread = likely_mistake(measurements, sigma0, _tried) if bad else []
     if misread:
         raise SolutionError("\n".join(["the readings do not fit together", *map(str, misread)]))
     control, left = wrong_control(measurements, gone, close)
-    found = wrongly_held(measurements, sigma0, gone, close) + control + told
+    problems = wrongly_held(measurements, sigma0, gone, close) + control + one_sided
+    # If one wrong held coordinate explains more outliers than SPARED, the program must not choose
+    # between coordinate and readings.
     if gone - left >= SPARED:
         text = message(
             "held_or_readings",
@@ -239,23 +283,26 @@ def _causes(adjusted, readings, gathered, measurements, diagnoses):
             gone=gone,
             left=left,
         )
-        raise SolutionError("\n".join(map(str, [text, *found])))
-    return found + (strained(readings, gathered.known) if not control else [])
+        raise SolutionError("\n".join(map(str, [text, *problems])))
+    return problems + (strained(readings, gathered.known) if not control else [])
 
 
 def _in_order(readings):
-    """Readings by file, then row, in the order in which they stand there."""
+    """Sort readings by file, then by row."""
     places = readings.columns["file"].tolist()
+    # Images and control come first, as in the report; the other files follow in alphabetical order.
     files = set(places)
-    files = [one for one in FILES if one in files] + sorted(files - set(FILES))
+    files = [name_of_file for name_of_file in FILES if name_of_file in files] + sorted(
+        files - set(FILES)
+    )
     rank = {name: i for i, name in enumerate(files)}
-    of = np.array([rank[file] for file in places])
+    rank_of_row = np.array([rank[file] for file in places])
     row = np.array([-1 if row is None else row for row in readings.columns["row"].tolist()])
-    return readings.where(np.lexsort((row, of)))
+    return readings.where(np.lexsort((row, rank_of_row)))
 
 
 def _cov_scale(adjusted, settings):
-    """Variance factor of the covariances that go on, and what is to be said about it."""
+    """Return the variance factor of the reported covariances and a list of Problem."""
     if settings.scale != "a_posteriori":
         return 1.0, []
     if adjusted.dof > 0 and adjusted.sigma0 > NOISELESS:
@@ -263,6 +310,7 @@ def _cov_scale(adjusted, settings):
     text = message(
         "nothing_redundant", "no observation is redundant: covariances keep the a-priori scale"
     )
+    # Zero residuals come from computed input; sigma0 = 0 would give zero uncertainty.
     if adjusted.dof > 0:
         text = message(
             "nothing_scatters",

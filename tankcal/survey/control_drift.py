@@ -1,4 +1,4 @@
-"""Control targets that a set-up reads again: by how much instrument and tripod moved meanwhile."""
+"""Repeated readings of control targets from one set-up: motion of instrument and tripod."""
 
 from dataclasses import dataclass
 
@@ -11,17 +11,17 @@ HOUR_S = 3600.0
 
 @dataclass(frozen=True)
 class RepeatedTarget:
-    """A control target as a set-up read it again and again; k readings, in the order of their time.
+    """A control target with k readings from one set-up, in the order of time.
 
     Attributes
     ----------
     setup, target : str
     rows : tuple of int or None, length k
-        In their file.
+        Rows of the file.
     elapsed_s : ndarray, shape (k,)
-        Since the first reading of the set-up.
+        Time since the first reading of the set-up, s.
     direction_rad, zenith_rad, distance_m : ndarray, shape (k,)
-        Less those of the first reading that has them; nan where this was not read.
+        Differences from the first reading of the same quantity; nan where it was not read.
     """
 
     setup: str
@@ -35,15 +35,15 @@ class RepeatedTarget:
 
 @dataclass(frozen=True)
 class Drift:
-    """A linear drift of a set-up, by all its control targets; nan where nothing tells it.
+    """Linear drift of a set-up, estimated from all its control targets; nan: not determined.
 
     Attributes
     ----------
     setup : str
     direction_rad_s, zenith_rad_s : float
-        Of the zero of the circle and of the zenith angle.
+        Drift of the circle zero and of the zenith angle, rad/s.
     hours : float
-        Between its first and its last reading.
+        Time between the first and the last reading, h.
     """
 
     setup: str
@@ -53,40 +53,49 @@ class Drift:
 
 
 def repeats_of(control):
-    """`RepeatedTarget` of each target of each set-up, in the order of their first rows.
+    """Return a `RepeatedTarget` for each target of each set-up, in the order of their first rows.
 
-    control  sequence of ControlReading
+    Parameters
+    ----------
+    control : sequence of ControlReading
     """
     start, groups = {}, {}
-    for one in control:
-        start[one.setup] = min(one.time_s, start.get(one.setup, np.inf))
-        groups.setdefault((one.setup, one.target), []).append(one)
-    found = []
-    for (setup, target), read in groups.items():
-        read = sorted(read, key=lambda one: one.time_s)
-        values = np.array([[one.direction_rad, one.zenith_rad, one.distance_m] for one in read])
+    for reading in control:
+        start[reading.setup] = min(reading.time_s, start.get(reading.setup, np.inf))
+        groups.setdefault((reading.setup, reading.target), []).append(reading)
+    repeated = []
+    for (setup, target), sequence in groups.items():
+        sequence = sorted(sequence, key=lambda reading: reading.time_s)
+        values = np.array(
+            [
+                [reading.direction_rad, reading.zenith_rad, reading.distance_m]
+                for reading in sequence
+            ]
+        )
         direction, zenith, distance = (_since_first(column) for column in values.T)
-        found.append(
+        repeated.append(
             RepeatedTarget(
                 setup,
                 target,
-                tuple(one.row for one in read),
-                np.array([one.time_s for one in read]) - start[setup],
+                tuple(reading.row for reading in sequence),
+                np.array([reading.time_s for reading in sequence]) - start[setup],
+                # Reduce the difference to (-pi, pi]: a reading may cross the zero of the circle.
                 direction - FULL_TURN * np.round(direction / FULL_TURN),
                 zenith,
                 distance,
             )
         )
-    return tuple(found)
+    return tuple(repeated)
 
 
 def _since_first(values):
-    there = np.flatnonzero(np.isfinite(values))
-    return values - (values[there[0]] if len(there) else 0.0)
+    """Differences (k,) from the first finite value."""
+    finite = np.flatnonzero(np.isfinite(values))
+    return values - (values[finite[0]] if len(finite) else 0.0)
 
 
 def drifts_of(repeats):
-    """`Drift` of each set-up: a slope common to its targets, each with a constant of its own.
+    """Return the `Drift` of each set-up: one slope for all targets, one constant for each target.
 
     Examples
     --------
@@ -96,24 +105,27 @@ def drifts_of(repeats):
     >>> round(3600 * drift.direction_rad_s, 9), drift.hours
     (1e-05, 2.0)
     """
-    found = []
-    for setup in dict.fromkeys(one.setup for one in repeats):
-        mine = [one for one in repeats if one.setup == setup]
-        hours = max(float(one.elapsed_s.max()) for one in mine) / HOUR_S
+    drifts = []
+    for setup in dict.fromkeys(target.setup for target in repeats):
+        targets = [target for target in repeats if target.setup == setup]
+        hours = max(float(target.elapsed_s.max()) for target in targets) / HOUR_S
         slopes = (
-            _slope([(one.elapsed_s, getattr(one, name)) for one in mine])
+            _slope([(target.elapsed_s, getattr(target, name)) for target in targets])
             for name in ("direction_rad", "zenith_rad")
         )
-        found.append(Drift(setup, *slopes, hours))
-    return tuple(found)
+        drifts.append(Drift(setup, *slopes, hours))
+    return tuple(drifts)
 
 
 def _slope(series):
-    """Slope common to series of times and values, each with a constant; nan: none tells it."""
-    above = below = 0.0
+    """Common slope of several series (times, values), each with its own constant; nan: not
+    determined."""
+    numerator = denominator = 0.0
     for times, values in series:
-        there = np.isfinite(values)
-        if there.sum() > 1:
-            time = times[there] - times[there].mean()
-            above, below = above + time @ values[there], below + time @ time
-    return float(above / below) if below > 0 else float("nan")
+        finite = np.isfinite(values)
+        if finite.sum() > 1:
+            # Centring the times eliminates the constant of the series from the normal equation of
+            # the slope.
+            time = times[finite] - times[finite].mean()
+            numerator, denominator = numerator + time @ values[finite], denominator + time @ time
+    return float(numerator / denominator) if denominator > 0 else float("nan")

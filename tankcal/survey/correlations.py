@@ -1,4 +1,4 @@
-"""Which values of a survey are correlated, in blocks: vectors, and pairs that a table names."""
+"""Blocks of correlated values of a survey: vectors, and pairs listed in a table."""
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -8,34 +8,54 @@ from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.survey.observations import Block, ControlCoordinates
 
-SMALLEST = 1e-10  # eigenvalue of a correlation matrix: below it the values contradict
+# smallest eigenvalue accepted of a correlation matrix; below it the values contradict
+SMALLEST = 1e-10
 
 
 def rows_of(correlated, table):
-    """Rows of a table that job.CorrelatedReadings (or None) name."""
+    """Set of the rows of a table that CorrelatedReadings (or None) name."""
     if correlated is None:
         return frozenset()
-    mine = np.array([[name == table for name in pair] for pair in correlated.tables])
-    return frozenset(correlated.at[mine].tolist())
+    is_in_table = np.array([[name == table for name in pair] for pair in correlated.tables])
+    return frozenset(correlated.at[is_in_table].tolist())
 
 
 def blocks_of(measurements, observations):
-    """The Blocks of correlated values of a survey's observations.
+    """Return the Blocks of correlated values of a survey's observations.
 
-    Raises InputError for correlations that are not possible together.
+    Parameters
+    ----------
+    measurements : Measurements
+    observations : sequence of Observations
+
+    Returns
+    -------
+    tuple of Block
+
+    Raises
+    ------
+    InputError
+        If a block of correlations has no positive definite covariance matrix.
     """
     sources, rows, components, sds, places = [], [], [], [], {}
     pairs = []
-    for source, one in enumerate(observations):
-        trace = one.trace
-        table = "control" if isinstance(one, ControlCoordinates) else trace.table
-        own = table == "vectors"
-        named = rows_of(measurements.correlated, table)
-        sd = np.reshape(one.sd, (len(one), one.rows))
-        for row in range(len(one)):
-            if not own and trace.rows[row] not in named:
+    for source, observations_of_source in enumerate(observations):
+        trace = observations_of_source.trace
+        table = "control" if isinstance(observations_of_source, ControlCoordinates) else trace.table
+        is_vector = table == "vectors"
+        correlated_rows = rows_of(measurements.correlated, table)
+        sd = np.reshape(
+            observations_of_source.sd, (len(observations_of_source), observations_of_source.rows)
+        )
+        for row in range(len(observations_of_source)):
+            # All components of a vector enter a block; of other tables only the listed rows do.
+            if not is_vector and trace.rows[row] not in correlated_rows:
                 continue
-            axes = one.axis[row : row + 1] if table == "control" else np.arange(one.rows)
+            axes = (
+                observations_of_source.axis[row : row + 1]
+                if table == "control"
+                else np.arange(observations_of_source.rows)
+            )
             for component, axis in enumerate(axes.tolist()):
                 places[table, trace.rows[row], axis] = len(sources)
                 sources.append(source)
@@ -48,7 +68,7 @@ def blocks_of(measurements, observations):
 
 
 def _within_vectors(measurements, places):
-    """(place, place, r, Problem's place) of the components of each vector."""
+    """Yield (place, place, r, (file, row, column)) for the components of each vector."""
     for table in measurements.readings:
         if table.table != "vectors":
             continue
@@ -60,7 +80,7 @@ def _within_vectors(measurements, places):
 
 
 def _between(correlated, places):
-    """The same of the pairs that a table names; values that are not adjusted are left out."""
+    """Yield (place, place, r, (file, row, column)) for listed pairs of adjusted values."""
     if correlated is None:
         return
     for i, tables in enumerate(correlated.tables):
@@ -73,7 +93,25 @@ def _between(correlated, places):
 
 
 def _split(sources, rows, components, sds, pairs):
-    """Blocks that hang together by their pairs."""
+    """Split the correlated values into independent Blocks.
+
+    Parameters
+    ----------
+    sources, rows, components : ndarray of int, shape (n,)
+        Table, row and component of each value.
+    sds : ndarray, shape (n,)
+    pairs : list of tuple
+        (place, place, r, (file, row, column)).
+
+    Returns
+    -------
+    tuple of Block
+
+    Raises
+    ------
+    InputError
+        If a correlation matrix is not positive definite, or a standard deviation is 0.
+    """
     if not len(sources):
         return ()
     n = len(sources)
@@ -81,21 +119,25 @@ def _split(sources, rows, components, sds, pairs):
     _, first = np.unique(np.column_stack([sources, rows]), axis=0, return_inverse=True)
     of_row = np.full(first.max() + 1, -1)
     of_row[first[::-1]] = np.arange(n)[::-1]
+    # Components of a row stay in one block even without a listed correlation: an observation is
+    # adjusted as a whole.
     ties = np.concatenate([a, np.arange(n)]), np.concatenate([b, of_row[first.ravel()]])
+    # Connected components of the graph of pairs are mutually uncorrelated.
     graph = coo_array((np.ones(len(ties[0])), ties), shape=(n, n))
     count, label = connected_components(graph, directed=False)
     r = np.eye(n)
     r[a, b] = r[b, a] = [pair[2] for pair in pairs]
-    found = []
-    for one in range(count):
-        mine = np.flatnonzero(label == one)
-        mine = mine[np.lexsort([components[mine], rows[mine], sources[mine]])]
-        part = r[np.ix_(mine, mine)]
-        if np.linalg.eigvalsh(part)[0] < SMALLEST or not (sds[mine] > 0).all():
-            _refuse(len(mine), next(pair[3] for pair in pairs if pair[0] in mine))
-        covariance = part * np.outer(sds[mine], sds[mine])
-        found.append(Block(sources[mine], rows[mine], components[mine], covariance))
-    return tuple(found)
+    blocks = []
+    for block in range(count):
+        members = np.flatnonzero(label == block)
+        # Sort by source, row and component, the order in which observations list their values.
+        members = members[np.lexsort([components[members], rows[members], sources[members]])]
+        part = r[np.ix_(members, members)]
+        if np.linalg.eigvalsh(part)[0] < SMALLEST or not (sds[members] > 0).all():
+            _refuse(len(members), next(pair[3] for pair in pairs if pair[0] in members))
+        covariance = part * np.outer(sds[members], sds[members])
+        blocks.append(Block(sources[members], rows[members], components[members], covariance))
+    return tuple(blocks)
 
 
 def _refuse(count, place):

@@ -1,4 +1,4 @@
-"""What holds the frame of a survey: the choice of a datum, and what it is worth."""
+"""Datum of a survey: its choice, and the coordinates that hold the frame."""
 
 from dataclasses import dataclass, field, replace
 
@@ -18,20 +18,29 @@ from tankcal.survey.observations import ControlCoordinates
 from tankcal.survey.results import DatumReport
 
 AXES = "xyz"
-SHOWN = 5  # names in a sentence
-SHARE = 1e-6  # of a way of moving in a combination, below which it is not in it
+SHOWN = 5  # names listed in a sentence
+SHARE = 1e-6  # smallest share of a rigid motion that counts as a part of a combination
 STILL = 1e-9  # motion of all unknowns over the sum of its parts, below which nothing moves
-WEAK = 1e-6  # smallest pivot of held coordinates over the largest, below which they hold too little
+# smallest singular value of held coordinates, relative; below it they do not fix the frame
+WEAK = 1e-6
 
 
 @dataclass(frozen=True)
 class Frame:
     """A survey with its datum.
 
-    survey    to be adjusted          options   of network.adjust: datum, over
-    report    DatumReport             held      (points, 3) True: control that holds the datum
-    tested    (points, 3) True: those of `held` that readings, too, speak of
-    warnings  tuple of Problem
+    Attributes
+    ----------
+    survey : network.Survey
+        Survey to adjust.
+    options : dict
+        Keyword arguments of network.adjust: datum, over.
+    report : DatumReport
+    held : ndarray of bool, shape (points, 3)
+        Control coordinates that hold the datum.
+    tested : ndarray of bool, shape (points, 3)
+        Held coordinates that the observations also determine.
+    warnings : tuple of Problem
     """
 
     survey: object
@@ -43,15 +52,35 @@ class Frame:
 
 
 def make_frame(survey, gathered, settings):
-    """The Frame of a survey with start values; raises SolutionError when the datum is missing."""
+    """Choose the datum of a survey with start values.
+
+    Parameters
+    ----------
+    survey : network.Survey
+    gathered : Gathered
+    settings : AdjustmentSettings
+
+    Returns
+    -------
+    Frame
+
+    Raises
+    ------
+    SolutionError
+        If the chosen datum does not remove the datum defect.
+    InputError
+        If settings.datum_points or settings.fixed_photo name unknown points or photos.
+    """
     bare = release_control(survey, gathered)
     problem = assemble(bare)
+    # The defect is that of the observations alone, so control is released first.
     free = _free(problem)
     choose = {"control": _control, "minimal": _minimal, "fixed_photo": _photo, "inner": _inner}
     chosen, options, held, names, warnings = choose[settings.datum](
         survey, bare, problem, free, gathered, settings
     )
     known = _known_frame(chosen, bare, gathered, settings, held, options)
+    # Declared control determines vertical and scale; coordinates held arbitrarily do not.
     undetermined = _free(assemble(known)) if free.shape[1] else free
     report = DatumReport(
         choice=settings.datum,
@@ -67,37 +96,40 @@ def make_frame(survey, gathered, settings):
             "no observation determines the scale: it comes from what holds the datum",
         )
         warnings = [*warnings, Problem("job.toml", text, None, "adjustment.datum")]
+    # A minimal datum without surplus has no redundancy: its coordinates cannot be tested.
     spare = settings.datum != "minimal" or held.sum() > free.shape[1]
     return Frame(chosen, options, report, held, held & spare, tuple(warnings))
 
 
 def _free(problem):
-    """Ways (7, d) in which something can move that nothing observes.
+    """Combinations (7, d) of rigid motions and scale that no observation determines.
 
-    A rotation about a line on which everything lies (heights alone, all at one place; one point
-    that hangs on one known point) moves nothing: it is none of them.
+    A rotation about a line that contains all points moves no point. Examples are heights at a
+    single place, or one point tied to one known point. Such rotations are excluded.
     """
-    found = null_space(problem)
-    if not found.shape[1]:
-        return found
+    combinations = null_space(problem)
+    if not combinations.shape[1]:
+        return combinations
     ways = directions(problem.layout, problem.state)
-    _, size, turns = np.linalg.svd(ways @ found, full_matrices=False)
-    parts = np.linalg.norm(np.abs(ways) @ np.abs(found))  # what moves nothing is a sum that cancels
-    return found @ turns[size > STILL * max(parts, 1e-9)].T
+    # Singular values of the motions: those near zero leave all unknowns in place.
+    _, size, turns = np.linalg.svd(ways @ combinations, full_matrices=False)
+    # scale: a combination without motion cancels here
+    parts = np.linalg.norm(np.abs(ways) @ np.abs(combinations))
+    return combinations @ turns[size > STILL * max(parts, 1e-9)].T
 
 
 def release_control(survey, gathered):
-    """The survey without control in its own frame, weighted or fixed."""
-    gone = [
+    """Return the survey without weighted or fixed control in its own frame."""
+    removed = [
         number
-        for number, one in enumerate(survey.observations)
-        if isinstance(one, ControlCoordinates) or not one.in_use.any()
+        for number, table in enumerate(survey.observations)
+        if isinstance(table, ControlCoordinates) or not table.in_use.any()
     ]
-    return replace(survey.without(gone), fixed=gathered.idle)
+    return replace(survey.without(removed), fixed=gathered.idle)
 
 
 def _moves(combinations, ways):
-    """Whether some combination (7, d) has a part of one of the ways."""
+    """Whether a combination (7, d) contains a part of one of the given motions."""
     if not combinations.shape[1]:
         return False
     share = np.sum(np.linalg.qr(combinations)[0] ** 2, axis=1)
@@ -105,7 +137,7 @@ def _moves(combinations, ways):
 
 
 def _known_frame(chosen, bare, gathered, settings, held, options):
-    """The survey with that part of its datum which somebody knows: declared, not only assumed."""
+    """Survey with only the declared part of its datum, without arbitrary choices."""
     declared = np.isfinite(gathered.known.xyz_m) & np.isfinite(gathered.known.sd_m)
     if settings.datum == "control":
         return chosen
@@ -120,7 +152,7 @@ def _known_frame(chosen, bare, gathered, settings, held, options):
 
 
 def _control(survey, bare, problem, free, gathered, settings):
-    """All control coordinates act as they were given."""
+    """Datum "control": all control coordinates act with their standard deviations."""
     known = gathered.known
     acting = np.isfinite(known.xyz_m) & np.isfinite(known.sd_m)
     missing = _free(assemble(survey)) if free.shape[1] else free
@@ -130,7 +162,10 @@ def _control(survey, bare, problem, free, gathered, settings):
 
 
 def _minimal(survey, bare, problem, free, gathered, settings):
-    """As many control coordinates as the defect are held, far apart unless they are named."""
+    """Datum "minimal": as many control coordinates as the defect are held.
+
+    They are chosen far apart, unless settings.datum_points names them.
+    """
     d, warnings = free.shape[1], []
     none = np.zeros((len(survey.points), 3), dtype=bool)
     if not d:
@@ -141,9 +176,11 @@ def _minimal(survey, bare, problem, free, gathered, settings):
     else:
         declared = np.isfinite(gathered.known.xyz_m) & ~gathered.idle
         candidates = declared if declared.any() else ~gathered.idle
+        # Prefer declared control; without it any observed coordinate may be held.
         wanted = _spread(rows, np.flatnonzero(candidates), d)
     held = none.copy()
     held.ravel()[wanted] = True
+    # The held coordinates remove the defect if their rows of the motion matrix have full rank.
     rank = _rank(rows[wanted])
     if rank < d:
         raise SolutionError(
@@ -174,7 +211,7 @@ def _minimal(survey, bare, problem, free, gathered, settings):
 
 
 def _photo(survey, bare, problem, free, gathered, settings):
-    """One photo keeps its place and its directions."""
+    """Datum "fixed_photo": position and rotation of one photo are held."""
     names = () if survey.photos is None else survey.photos.names
     name = settings.fixed_photo or (names[0] if names else None)
     if name not in names:
@@ -194,20 +231,24 @@ def _photo(survey, bare, problem, free, gathered, settings):
         raise SolutionError(datum_defect_sentence(left, problem))
     held = np.zeros((len(survey.points), 3), dtype=bool)
     released = _released(survey, _exact(gathered), "fixed_photo")
-    if free.shape[1] < 6:  # observations determine the rest: holding that, too, would strain them
+    # Observations determine part of the six parameters. Holding all six would strain the network,
+    # so the photo is held by inner constraints.
+    if free.shape[1] < 6:
         number = names.index(name)
         return bare, {"datum": "inner", "photo": number}, held, (name,), released
     return chosen, {}, held, (name,), released
 
 
 def _inner(survey, bare, problem, free, gathered, settings):
-    """Chosen points keep their places on the whole, as far as held control leaves them free."""
+    """Datum "inner": the chosen points keep their positions on average, as far as held control
+    permits."""
     known, held = gathered.known, _exact(gathered)
     xyz = np.where(np.isfinite(known.xyz_m), known.xyz_m, survey.xyz_m)
     if not free.shape[1]:
         warnings = [_nothing_left("inner"), *_released(survey, held, "inner")]
         return bare, {}, np.zeros_like(held), (), warnings
     chosen, fixed = replace(bare, xyz_m=xyz, fixed=bare.fixed | held), _named(survey, held)
+    # Exact control may remove part of the defect; inner constraints remove the rest.
     problem = assemble(chosen)
     left = _free(problem)
     if not left.shape[1]:
@@ -216,6 +257,7 @@ def _inner(survey, bare, problem, free, gathered, settings):
         over = np.flatnonzero(_wanted(survey, settings).any(axis=1))
     else:
         over = np.flatnonzero(np.isfinite(known.xyz_m).all(axis=1) & ~held.all(axis=1))
+        # Inner constraints need three points to fix a rotation.
         over = over if len(over) > 2 else np.arange(len(survey.points))
     d = left.shape[1]
     rank = _rank(_motions(problem, left).reshape(-1, 3, d)[over].reshape(-1, d))
@@ -236,13 +278,13 @@ def _inner(survey, bare, problem, free, gathered, settings):
 
 
 def _exact(gathered):
-    """(points, 3) True for control coordinates that hold exactly and that something observes."""
+    """Mask (points, 3) of observed control coordinates with standard deviation 0."""
     known = gathered.known
     return np.isfinite(known.xyz_m) & (known.sd_m == 0) & ~gathered.idle
 
 
 def _released(survey, held, choice):
-    """Problem rows that tell of control that holds exactly, and that a datum does not hold."""
+    """Problem rows for exact control that the datum does not hold."""
     if not held.any():
         return []
     text = message(
@@ -265,15 +307,17 @@ def _nothing_left(choice):
 
 
 def _motions(problem, free):
-    """Change (3 points, d) of all coordinates by what is free, each way scaled to size one."""
+    """Change (3 points, d) of coordinates by the free combinations, each scaled to an rms of 1."""
     layout = problem.layout
+    # The appended zero row serves fixed coordinates, whose column number is -1.
     ways = np.vstack([directions(layout, problem.state), np.zeros(7)])[layout.points.ravel()] @ free
     size = np.sqrt(np.mean(ways**2, axis=0))
     return ways / np.where(size > 0, size, 1.0)
 
 
 def _spread(rows, candidates, d):
-    """d of the candidates that hold the free ways best: largest volume, one after the other."""
+    """Choose d candidates that hold the free combinations best, by pivoted QR."""
+    # Each pivot maximizes the volume spanned by the rows chosen so far.
     _, _, order = scipy.linalg.qr(rows[candidates].T, mode="economic", pivoting=True)
     return np.sort(candidates[order[:d]])
 
@@ -286,12 +330,12 @@ def _rank(rows):
 
 
 def _wanted(survey, settings):
-    """(points, 3) the coordinates that `datum_points` names."""
-    found = np.zeros((len(survey.points), 3), dtype=bool)
+    """Mask (points, 3) of the coordinates named in `datum_points`."""
+    mask = np.zeros((len(survey.points), 3), dtype=bool)
     missing = []
     for name, axes in settings.datum_points:
         if name in survey.points:
-            found[survey.points.index(name), [AXES.index(axis) for axis in axes]] = True
+            mask[survey.points.index(name), [AXES.index(axis) for axis in axes]] = True
         else:
             missing.append(
                 Problem(
@@ -303,11 +347,11 @@ def _wanted(survey, settings):
             )
     if missing:
         raise InputError(missing)
-    return found
+    return mask
 
 
 def _named(survey, mask):
-    """Names with axes of the coordinates of a mask (points, 3)."""
+    """Names with axes of the coordinates in a mask (points, 3)."""
     return tuple(
         f"{survey.points[i]}:{''.join(AXES[k] for k in np.flatnonzero(mask[i]))}"
         for i in np.flatnonzero(mask.any(axis=1))

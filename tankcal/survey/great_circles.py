@@ -1,4 +1,4 @@
-"""Great circles of a sphere by tape: the equator, and meridians from pole to pole."""
+"""Great circles of a sphere measured by tape: the equator, and meridians from pole to pole."""
 
 from dataclasses import dataclass
 
@@ -11,19 +11,19 @@ KINDS = ("equator", "meridian")
 
 @dataclass(frozen=True)
 class GreatCircles:
-    """What was strapped of a sphere, and with what.
+    """Strapping of a sphere.
 
     Attributes
     ----------
     strapping : Strapping
-        Readings and tapes; the circumference of a `Strap` is a circle, its course the kind.
+        Readings and tapes. The name of a `Strap` is a circle, its course the kind of circle.
     azimuth_rad : dict
-        {name of a circle: azimuth of the plane of a meridian, clockwise from +y; nan: equator}.
+        {circle: azimuth of the plane of a meridian, clockwise from +y, rad; nan: equator}.
     """
 
     strapping: Strapping
     azimuth_rad: dict
 
     def azimuths(self, straps):
-        """(n,) azimuths of the circles that straps are on, rad; nan: the equator."""
-        return np.array([self.azimuth_rad[one.name] for one in straps], dtype=float)
+        """Azimuths (n,) of the circles of the straps, rad; nan: the equator."""
+        return np.array([self.azimuth_rad[strap.name] for strap in straps], dtype=float)

@@ -1,8 +1,8 @@
-"""Repeated readings become one: weighted means, and whether their scatter is what was declared.
+"""Weighted means of repeated readings, and tests of their scatter.
 
 With weights p = 1/s2 of the readings of one value:   mean = sum(p l) / sum(p),   s2 = 1 / sum(p),
-chi2 = sum(p (l - mean)2) with one degree of freedom fewer than readings. The adjustment of the
-means gives the same unknowns and covariance as that of all readings. Source: Koch 1999, section 3.
+chi2 = sum(p (l - mean)2) with one degree of freedom fewer than readings. Adjusting the means gives
+the same unknowns and covariance as adjusting all readings. Source: Koch 1999, section 3.
 """
 
 from dataclasses import dataclass, replace
@@ -13,18 +13,28 @@ from scipy.special import chdtri
 from tankcal.errors import Problem
 from tankcal.messages import message
 
-LEVEL = 0.001  # of the tests of scatter, for all readings of a file together
+LEVEL = 0.001  # significance level of a test of scatter, for all readings of a file together
 
 
 @dataclass(frozen=True)
 class Averages:
     """Means of n different values, in the order of their first readings.
 
-    value, sd  (n, m)             first  (n,) number of the first reading
-    repeats    (n,)               chi2   (n, m) scatter of the readings, in their sds
-    group      (readings,) number of the value that each belongs to
-    away       (readings, m) reading minus mean, in sds of the reading
-    share      (readings, m) of its weight in that of all readings of the value
+    Attributes
+    ----------
+    value, sd : ndarray, shape (n, m)
+    first : ndarray of int, shape (n,)
+        Number of the first reading.
+    repeats : ndarray of int, shape (n,)
+        Number of readings.
+    chi2 : ndarray, shape (n, m)
+        Sum of squared deviations of the readings, each over its variance.
+    group : ndarray of int, shape (readings,)
+        Number of the value of each reading.
+    away : ndarray, shape (readings, m)
+        Reading minus mean, over the standard deviation of the reading.
+    share : ndarray, shape (readings, m)
+        Weight of a reading over the total weight of its value.
     """
 
     value: np.ndarray
@@ -38,24 +48,36 @@ class Averages:
 
 
 def average_readings(label, value, sd, *, angle=False):
-    """The Averages of readings that have the same label.
+    """Average readings with equal labels.
 
-    label      (n,) whole numbers       value, sd  (n,) or (n, m)
-    angle      True: a full turn (rad) is no difference
+    Readings with standard deviation 0 are not averaged.
 
-    Readings that are fixed (sd 0) stay as they are, each on its own.
+    Parameters
+    ----------
+    label : ndarray of int, shape (n,)
+    value, sd : ndarray, shape (n,) or (n, m)
+    angle : bool
+        True: values that differ by a full turn (2 pi rad) are equal.
+
+    Returns
+    -------
+    Averages
     """
     n = len(label)
     value, sd = (np.asarray(a, dtype=float).reshape(n, -1 if n else 1) for a in (value, sd))
     fixed = (sd == 0).any(axis=1)
+    # A weight 1/0 is undefined: each fixed reading receives a label of its own.
     label = np.where(fixed, np.max(label, initial=0) + 1 + np.arange(n), label)
     _, first, group, repeats = np.unique(
         label, return_index=True, return_inverse=True, return_counts=True
     )
+    # np.unique sorts by label; restore the order of first readings.
     order = np.argsort(first)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     first, group, repeats = first[order], rank[group], repeats[order]
+    # Average differences from the first reading: they are small, which limits rounding and lets
+    # angles be reduced to one turn.
     away = value - value[first][group]
     if angle:
         away -= 2 * np.pi * np.round(away / (2 * np.pi))
@@ -66,64 +88,76 @@ def average_readings(label, value, sd, *, angle=False):
     mean /= total
     off = np.sqrt(weight) * (away - mean[group])
     np.add.at(chi2, group, off**2)
+    # A single reading keeps its standard deviation exactly.
     mean_sd = np.where((repeats == 1)[:, None], sd[first], 1.0 / np.sqrt(total))
     share = weight / total[group]
     return Averages(value[first] + mean, mean_sd, first, repeats, chi2, group, off, share)
 
 
 def contradictory_labels(label, averages):
-    """Labels (readings,) with which values that one reading alone contradicts are not averaged.
+    """Give readings of a contradictory value labels of their own.
 
-    They scatter more than they may, and not so once the worst is gone: each then goes into the
-    adjustment on its own, where the search for blunders finds the worst.
+    A value is contradictory if its readings fail the test of scatter, but pass it without the worst
+    reading. Each reading is then adjusted separately, so that data snooping can identify the worst.
+
+    Parameters
+    ----------
+    label : ndarray of int, shape (readings,)
+    averages : Averages
+
+    Returns
+    -------
+    ndarray of int, shape (readings,)
     """
     dof = averages.repeats - 1
+    # Bounds with n - 1 degrees of freedom for all readings, n - 2 without one of them.
     limit, without = (
         chdtri(np.maximum(dof - i, 1), LEVEL / max(np.count_nonzero(dof), 1))[:, None]
         for i in (0, 1)
     )
     single = np.minimum(averages.share, 0.999)
-    left = averages.chi2[averages.group] - averages.away**2 / (1 - single)
-    agree = (left <= without[averages.group]).all(axis=1)
+    # Removing reading i lowers chi2 by d_i^2 / (1 - p_i / sum p), as its mean moves too.
+    chi2_without = averages.chi2[averages.group] - averages.away**2 / (1 - single)
+    agree = (chi2_without <= without[averages.group]).all(axis=1)
     torn = (averages.chi2 > limit).any(axis=1) & (dof > 0)
     torn &= np.bincount(averages.group, weights=agree, minlength=len(dof)) > 0
     if not torn.any():
         return label
-    own = np.max(label, initial=0) + 1 + np.arange(len(label))
-    return np.where(torn[averages.group], own, label)
+    separate = np.max(label, initial=0) + 1 + np.arange(len(label))
+    return np.where(torn[averages.group], separate, label)
 
 
-def average_repeated(one, label, warnings, *, name_of=None, apart=False):
-    """Observations of which those of the same value are one, their weighted mean.
+def average_repeated(observations, label, warnings, *, name_of=None, apart=False):
+    """Replace repeated observations by their weighted means.
 
     Parameters
     ----------
-    one : Observations
-        Readings one by one, with their Trace.
+    observations : Observations
+        Single readings with their Trace.
     label : ndarray of int, shape (n,)
-        The same number for readings of the same value.
+        Equal for readings of the same value.
     warnings : list of Problem
-        To which warnings of scatter are added.
-    name_of : callable
-        What a value is called in them, of its names and element in the Trace; None: its names.
+        Receives warnings of excessive scatter.
+    name_of : callable, optional
+        name_of(ids, element) names a value in warnings; default: its names joined by hyphens.
     apart : bool
-        True: values that one reading alone contradicts are not averaged.
+        True: values contradicted by a single reading are not averaged.
 
     Returns
     -------
     Observations
-        In the order of their first readings; the Trace has their number and scatter.
+        In the order of their first readings; the Trace has number and scatter of the readings.
     """
-    if not len(one):
-        return one
-    angle = one.unit == "rad"
-    means = average_readings(label, one.value, one.sd, angle=angle)
-    warnings += _scatter_warnings(means, one.trace, name_of or _joined)
+    if not len(observations):
+        return observations
+    angle = observations.unit == "rad"
+    means = average_readings(label, observations.value, observations.sd, angle=angle)
+    warnings += _scatter_warnings(means, observations.trace, name_of or _joined)
     torn = contradictory_labels(label, means) if apart else label
     if torn is not label:
-        means = average_readings(torn, one.value, one.sd, angle=angle)
-    first = one.taken(means.first)
-    value, sd = (np.reshape(of, np.shape(first.value)) for of in (means.value, means.sd))
+        means = average_readings(torn, observations.value, observations.sd, angle=angle)
+    first = observations.taken(means.first)
+    value, sd = (np.reshape(column, np.shape(first.value)) for column in (means.value, means.sd))
     trace = replace(first.trace, repeats=means.repeats, scatter=means.chi2.sum(axis=1))
     return replace(first, value=value, sd=sd, trace=trace)
 
@@ -133,19 +167,28 @@ def _joined(ids, element):
 
 
 def _scatter_warnings(averages, trace, name_of):
-    """Problem rows for repeated readings that scatter other than their sds say.
+    """Problem rows for repeated readings whose scatter contradicts their standard deviations.
 
-    averages  Averages       trace  Trace of the readings       name_of  see average_repeated
+    Each value is tested at a level that gives one false alarm in a thousand files. A second test
+    uses all values together.
 
-    Each value is tested, at a level that errs for one file in a thousand; and all values together.
+    Parameters
+    ----------
+    averages : Averages
+    trace : Trace
+        Trace of the readings.
+    name_of : callable
+        See `average_repeated`.
     """
     dof = (averages.repeats - 1)[:, None] * np.ones(averages.chi2.shape[1], dtype=int)
     tested = int(np.count_nonzero(dof))
     if not tested:
         return []
+    # Bonferroni: dividing the level by the number of tests keeps the level of the whole file.
     limit = chdtri(np.maximum(dof, 1), LEVEL / tested)
     ratio = np.where(dof > 0, averages.chi2 / limit, 0.0).max(axis=1)
-    found = []
+    problems = []
+    # The five worst values represent a file; more lines would repeat the finding.
     for i in np.argsort(-ratio)[:5]:
         if ratio[i] > 1:
             share, first = np.sqrt((averages.chi2[i] / dof[i]).max()), averages.first[i]
@@ -157,14 +200,16 @@ def _scatter_warnings(averages, trace, name_of):
                 what=name_of(trace.ids[first], trace.element[first]),
                 times=share,
             )
-            found.append(Problem(trace.file, text, trace.rows[first]))
-    return found + _of_all(averages.chi2.sum(), int(dof.sum()), trace.file, bool(found))
+            problems.append(Problem(trace.file, text, trace.rows[first]))
+    return problems + _test_all(averages.chi2.sum(), int(dof.sum()), trace.file, bool(problems))
 
 
-def _of_all(chi2, dof, file, told):
+def _test_all(chi2, dof, file, is_reported):
+    """Problem rows of the two-sided chi-square test of all repeated readings together."""
     share = np.sqrt(chi2 / dof)
     high, low = chdtri(dof, [LEVEL / 2, 1 - LEVEL / 2])
-    if low <= chi2 <= high or (told and chi2 > high):
+    # Too large a scatter has been reported for single values already.
+    if low <= chi2 <= high or (is_reported and chi2 > high):
         return []
     text = message(
         "all_readings_scatter",

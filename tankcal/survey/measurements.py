@@ -1,8 +1,8 @@
-"""What was measured on site, as it was read: the checked tables of a survey, in SI.
+"""Measurements of a survey as read: checked tables in SI units.
 
-Image coordinates and cameras stay in millimetres, angles are radians. Rows stand in the order of
-their files, repeated readings one by one; nothing has been averaged, corrected or left out. Names
-are texts; a table that is not there is None or ().
+Image coordinates and cameras stay in millimetres; angles are in radians. Rows keep the order of
+their files, and repeated readings stay separate. Values are neither averaged, corrected nor
+omitted. Names are texts; an absent table is None or ().
 """
 
 from dataclasses import dataclass, field
@@ -16,22 +16,36 @@ from tankcal.survey.network.survey import Camera
 
 @dataclass(frozen=True)
 class AdjustmentSettings:
-    """[adjustment]: what the user decides.
+    """Settings of [adjustment].
 
-    datum         "control", "fixed_photo", "minimal" or "inner"
-    datum_points  (name, axes) with axes such as "xyz", "xy", "z": those that carry a datum
-                  "minimal" or "inner"; (): the program chooses
-    fixed_photo   name, for datum = "fixed_photo"
-    image_sd_mm   of image coordinates that carry none; None: not given
-    snooping      whether blunders are searched and set aside
-    scale         of the covariances that go on: "a_priori" or "a_posteriori"
-    refraction    coefficient k (0.13) for zenith angles, vertical angles and slope distances; None:
-                  neither curvature nor refraction
-    explain       whether a survey that does not fit is tried again as if it had been misread; what
-                  compares wrong suppositions on purpose leaves it out
-    reading_limit_mm  sd of one of repeated readings beyond which they are rejected; None: never
-    depth_of_field    whether radial distortion follows the depth of each point
-    image_weights     "measured" or "ideal": the image in which residuals are weighed (camera.Form)
+    Attributes
+    ----------
+    datum : str
+        "control", "fixed_photo", "minimal" or "inner".
+    datum_points : tuple of (str, str)
+        (name, axes), axes such as "xyz", "xy", "z", that hold a datum "minimal" or "inner"; ():
+        chosen by the program.
+    fixed_photo : str or None
+        Name of the photo for datum = "fixed_photo".
+    image_sd_mm : float or None
+        Standard deviation of image coordinates without one; None: not given.
+    snooping : bool
+        Whether to search for blunders and reject them.
+    scale : str
+        Scale of the reported covariances: "a_priori" or "a_posteriori".
+    refraction : float or None
+        Coefficient k (0.13) for zenith angles, vertical angles and slope distances; None: neither
+        curvature nor refraction.
+    explain : bool
+        Whether to search for mistakes in the input when the survey does not fit. Comparisons of
+        wrong assumptions disable the search.
+    reading_limit_mm : float or None
+        Standard deviation of one reading beyond which repeated readings are rejected; None: no
+        limit.
+    depth_of_field : bool
+        Whether radial distortion depends on the depth of each point.
+    image_weights : str
+        "measured" or "ideal": image in which residuals are weighted (camera.Form).
     """
 
     datum: str = "control"
@@ -49,12 +63,19 @@ class AdjustmentSettings:
 
 @dataclass(frozen=True)
 class CameraSetup:
-    """A camera of cameras.toml with what [adjustment.camera] says of its parameters.
+    """A camera of cameras.toml with the settings of [adjustment.camera].
 
-    camera     network.Camera, mm
-    format_mm  (2,) width and height of the image
-    pixel_mm   (2,) size of a pixel, or None: image coordinates come in mm
-    lens       radial distortion by distance, which `camera` has at the focus; None: one for all
+    Attributes
+    ----------
+    camera : network.Camera
+        In millimetres.
+    format_mm : ndarray, shape (2,)
+        Width and height of the image.
+    pixel_mm : ndarray, shape (2,), or None
+        Size of a pixel; None: image coordinates are in mm.
+    lens : Lens or None
+        Radial distortion as a function of distance; `camera` has the distortion at the focus. None:
+        one distortion for all distances.
     """
 
     camera: Camera
@@ -64,15 +85,22 @@ class CameraSetup:
 
     @property
     def format_px(self):
-        """(2,) columns and lines of the image, whole; needs `pixel_mm`."""
+        """Columns and lines of the image (2,) as integers; requires `pixel_mm`."""
         return np.round(self.format_mm / self.pixel_mm).astype(int)
 
 
 @dataclass(frozen=True)
 class Photo:
-    """A photo: values (6,) x, y, z (m), omega, phi, kappa (rad), nan where not known.
+    """A photo.
 
-    sd  (6,) nan: the value is an approximation; 0: it is fixed; else it is an observation
+    Attributes
+    ----------
+    name, camera : str
+    values : ndarray, shape (6,)
+        x, y, z (m), omega, phi, kappa (rad); nan: unknown.
+    sd : ndarray, shape (6,)
+        nan: the value is an approximation; 0: it is fixed; otherwise it is observed.
+    row : int or None
     """
 
     name: str
@@ -84,11 +112,21 @@ class Photo:
 
 @dataclass(frozen=True)
 class ImageReadings:
-    """Image coordinates (n, 2), mm, x to the right and y up from the middle of the format.
+    """Image coordinates, x to the right and y upwards from the centre of the format.
 
-    sd_mm  (n, 2), nan where not given        check  (n,) True: compared, not adjusted
-    shared_sd_mm  (n, 2) of the transformation from the comparator, the same error for all readings
-                  of a point; None: no photo was read on a comparator
+    Attributes
+    ----------
+    photo, point : tuple, length n
+    xy_mm : ndarray, shape (n, 2)
+    sd_mm : ndarray, shape (n, 2)
+        nan: not given.
+    check : ndarray of bool, shape (n,)
+        True: compared, not adjusted.
+    rows : tuple
+    file : str
+    shared_sd_mm : ndarray, shape (n, 2), or None
+        Standard deviation of the comparator transformation, an error common to all readings of a
+        point; None: no photo was read on a comparator.
     """
 
     photo: tuple
@@ -105,7 +143,15 @@ class ImageReadings:
 class RejectedReadings:
     """Repeated readings of a point or mark that scatter beyond the limit.
 
-    count  of the readings    sd_mm  (2,) of one of them, from the sample    row  of the first
+    Attributes
+    ----------
+    photo, name : str
+    count : int
+        Number of readings.
+    sd_mm : ndarray, shape (2,)
+        Sample standard deviation of one reading.
+    row : int or None
+        Row of the first reading.
     """
 
     photo: str
@@ -117,15 +163,27 @@ class RejectedReadings:
 
 @dataclass(frozen=True)
 class FiducialFit:
-    """How the readings of a photo's marks fit their calibrated coordinates.
+    """Fit of the readings of a photo's fiducial marks to their calibrated coordinates.
 
-    marks        (n,) names            calibrated_mm  (n, 2)
-    count        (n,) readings         mean_mm        (n, 2) of the readings, without weights
-    sd_mm        (n, 2) of one reading, from the sample; nan for a single one
-    residual_mm  (n, 2) mean of the readings, transformed, minus calibrated
-    rejected     tuple of RejectedReadings
-    growth       largest sd of an image coordinate over what it would be without that of the
-                 transformation; nan without image points
+    Attributes
+    ----------
+    photo, camera : str
+    marks : tuple, length n
+        Names of the marks.
+    calibrated_mm : ndarray, shape (n, 2)
+    count : ndarray of int, shape (n,)
+        Number of readings.
+    mean_mm : ndarray, shape (n, 2)
+        Unweighted mean of the readings.
+    sd_mm : ndarray, shape (n, 2)
+        Sample standard deviation of one reading; nan for a single one.
+    residual_mm : ndarray, shape (n, 2)
+        Transformed mean of the readings minus calibrated.
+    transformation : Transformation
+    rejected : tuple of RejectedReadings
+    growth : float
+        Largest ratio of the standard deviation of an image coordinate with and without the
+        uncertainty of the transformation; nan without image points.
     """
 
     photo: str
@@ -143,11 +201,21 @@ class FiducialFit:
 
 @dataclass(frozen=True)
 class KnownPoints:
-    """Control or check points: coordinates (n, 3), nan where not known.
+    """Control or check points.
 
-    sd_m    (n, 3) nan: an approximation only; 0: fixed; else an observation
-    system  (n,) name of the coordinate system, None: that of the survey
-    check   (n,) True: compared, not adjusted
+    Attributes
+    ----------
+    point : tuple, length n
+    xyz_m : ndarray, shape (n, 3)
+        nan: unknown.
+    sd_m : ndarray, shape (n, 3)
+        nan: approximation only; 0: fixed; otherwise observed.
+    system : tuple, length n
+        Name of the coordinate system; None: that of the survey.
+    check : ndarray of bool, shape (n,)
+        True: compared, not adjusted.
+    rows : tuple
+    file : str
     """
 
     point: tuple
@@ -161,10 +229,17 @@ class KnownPoints:
 
 @dataclass(frozen=True)
 class Targets:
-    """Where targets sit on the nominal tank: names of section and generatrix (or None) of each.
+    """Positions of targets on the nominal tank.
 
-    z_m       (n,) in the frame of the survey, nan where not given
-    offset_m  (n,) from the wall to the centre of the target, towards the observer
+    Attributes
+    ----------
+    point, section, generatrix : tuple, length n
+        Name of the target, its section and generatrix (or None).
+    z_m : ndarray, shape (n,)
+        In the frame of the survey; nan: not given.
+    offset_m : ndarray, shape (n,)
+        From the wall to the centre of the target, towards the observer.
+    rows : tuple
     """
 
     point: tuple
@@ -179,13 +254,21 @@ class Targets:
 class Instrument:
     """An instrument of instruments.toml.
 
-    kind                     "tape", "edm", "total_station", "theodolite", "level" or "other"
-    correction               true distance = (reading + correction_m) (1 + correction), at the
-    correction_m             certified temperature
-    certified_temperature_c  None: readings are not corrected for temperature
-    expansion_per_k          of a tape
-    u_scale, u_offset_m      standard uncertainties; 0: exact; nan: free unknowns
-    details                  certificate, tension_n and other things that are printed
+    Attributes
+    ----------
+    name : str
+    kind : str
+        "tape", "edm", "total_station", "theodolite", "level" or "other".
+    correction, correction_m : float
+        True distance = (reading + correction_m) (1 + correction) at the certified temperature.
+    certified_temperature_c : float or None
+        None: readings are not corrected for temperature.
+    expansion_per_k : float
+        Thermal expansion of a tape.
+    u_scale, u_offset_m : float
+        Standard uncertainties; 0: exact; nan: free unknowns.
+    details : dict
+        Certificate, tension_n and other printed data.
     """
 
     name: str
@@ -201,7 +284,7 @@ class Instrument:
 
 @dataclass(frozen=True)
 class Setup:
-    """An instrument over a station. `instrument` may be None; height_m above the station's mark."""
+    """An instrument set up on a station; height_m above the mark, `instrument` may be None."""
 
     name: str
     station: str
@@ -214,21 +297,41 @@ class Setup:
 class Readings:
     """One table of readings between points.
 
-    table     "distances", "slope_distances", "directions", "zenith_angles", "azimuths",
-              "horizontal_angles", "vertical_angles", "height_differences", "plumb_lines",
-              "vectors"
-    value     (n,) m or rad; zeros for plumb lines      sd  (n,) m or rad; 0: fixed
-    start     (n,) point, or None where a setup says it      end    (n,) point
-    origin    (n,) of horizontal angles: where they count from; else ()
-    setup     (n,) of those that are taken from a set-up; else ()
-    set       (n,) name of the set of directions within a set-up, or None; else ()
-    instrument     (n,) of distances, or None; else ()
-    horizontal     (n,) True: a horizontal distance
-    temperature_c  (n,) nan where not given              target_height_m  (n,) 0 where not given
-    check     (n,) True: compared, not adjusted
-    sheet     what messages call the table when it stands in a workbook; else ""
+    Vectors have value and sd (n, 3), and correlation (n, 3) of x with y, x with z, y with z.
 
-    Of vectors value and sd are (n, 3), and correlation (n, 3): of x with y, x with z, y with z.
+    Attributes
+    ----------
+    table : str
+        "distances", "slope_distances", "directions", "zenith_angles", "azimuths",
+        "horizontal_angles", "vertical_angles", "height_differences", "plumb_lines" or "vectors".
+    value : ndarray, shape (n,)
+        m or rad; zeros for plumb lines.
+    sd : ndarray, shape (n,)
+        m or rad; 0: fixed.
+    start : tuple, length n
+        Point, or None where the set-up determines it.
+    end : tuple, length n
+        Point.
+    check : ndarray of bool, shape (n,)
+        True: compared, not adjusted.
+    origin : tuple
+        Reference points of horizontal angles; otherwise ().
+    setup : tuple
+        Set-ups of the readings; otherwise ().
+    set : tuple
+        Names of the sets of directions within a set-up, or None; otherwise ().
+    instrument : tuple
+        Instruments of distances, or None; otherwise ().
+    horizontal : ndarray of bool, shape (n,)
+        True: a horizontal distance.
+    temperature_c : ndarray, shape (n,)
+        nan: not given.
+    target_height_m : ndarray, shape (n,)
+        0 where not given.
+    rows : tuple
+    sheet : str
+        Name of the table in messages if it is in a workbook; otherwise "".
+    correlation : ndarray, shape (n, 3), or None
     """
 
     table: str
@@ -250,17 +353,26 @@ class Readings:
 
     @property
     def file(self):
-        """Name of its file, or of its sheet in a workbook, for messages."""
+        """Name of the file, or of the sheet in a workbook, for messages."""
         return self.sheet or f"{self.table}.csv"
 
 
 @dataclass(frozen=True)
 class CorrelatedReadings:
-    """Pairs of values that are correlated, one in a row of correlated_readings.csv.
+    """Pairs of correlated values, one per row of correlated_readings.csv.
 
-    tables  (n, 2) names of their tables, "control" among them       r  (n,)
-    at      (n, 2) their rows there, counted as the file's editor counts
-    axis    (n, 2) 0 1 2 for x y z, of tables with one value a row: 0
+    Attributes
+    ----------
+    tables : tuple, length n
+        Pairs of table names, including "control".
+    at : ndarray of int, shape (n, 2)
+        Rows in these tables, as shown by an editor.
+    axis : ndarray of int, shape (n, 2)
+        0, 1, 2 for x, y, z; 0 for tables with one value per row.
+    r : ndarray, shape (n,)
+        Correlation coefficients.
+    rows : tuple
+    file : str
     """
 
     tables: tuple
@@ -273,7 +385,7 @@ class CorrelatedReadings:
 
 @dataclass(frozen=True)
 class NominalTank:
-    """What helps with approximate values: nominal tank, and the z of its bottom (None: unknown)."""
+    """Nominal tank for approximate values, and z of its bottom (None: unknown)."""
 
     radius_m: float
     height_m: float
@@ -282,15 +394,26 @@ class NominalTank:
 
 @dataclass(frozen=True)
 class Measurements:
-    """Everything that was measured on site and goes into one adjustment.
+    """All measurements of one adjustment.
 
-    cameras, instruments, photos, setups  in the order of their files
-    control   None: no control.csv             check    None: no check.csv
-    readings  a table for each file that has rows
-    nominal   None where the job has no vertical tank
-    fiducials a FiducialFit for each photo that was read on a comparator: `image_points` are
-              transformed by them already
-    kept      (file, row) of readings that no search for blunders may set aside
+    Attributes
+    ----------
+    settings : AdjustmentSettings
+    cameras, photos, instruments, setups : tuple
+        In the order of their files.
+    image_points : ImageReadings or None
+    control, check : KnownPoints or None
+        None: no control.csv or check.csv.
+    targets : Targets or None
+    readings : tuple of Readings
+        One for each file with rows.
+    nominal : NominalTank or None
+        None: the job has no vertical tank.
+    fiducials : tuple of FiducialFit
+        One for each photo read on a comparator; `image_points` are transformed already.
+    correlated : CorrelatedReadings or None
+    kept : frozenset
+        (file, row) of readings that data snooping must not reject.
     """
 
     settings: AdjustmentSettings = AdjustmentSettings()

@@ -1,4 +1,4 @@
-"""Targets of a scan under names, in a frame or in a unit that cannot be theirs."""
+"""Detection of scan targets with wrong names, a wrong frame or a wrong unit."""
 
 from dataclasses import dataclass
 
@@ -7,14 +7,14 @@ import numpy as np
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
-FEWEST = 3  # targets that tell a pose
-FAR_BETTER = 5.0  # times: so much better a wrong name, frame or unit has to fit
-LEAST_CHANGE = 0.01  # of a scale that no scanner has: another unit
+FEWEST = 3  # targets that determine a pose
+FAR_BETTER = 5.0  # ratio of misfits that makes a wrong name, frame or unit credible
+LEAST_CHANGE = 0.01  # scale error larger than that of any scanner: indicates another unit
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A rigid motion between two sets of places: its root mean square misfit, m."""
+    """Similarity between two sets of places, with its rms misfit in metres."""
 
     rotation: np.ndarray
     shift_m: np.ndarray
@@ -22,16 +22,21 @@ class Fit:
     rms_m: float
 
 
-def fit_motion(own_m, there_m, *, scaled=False, mirrored=False):
-    """`Fit` that brings places (n, 3) of a scan onto places (n, 3) of the tank.
+def fit_motion(scan_m, tank_m, *, scaled=False, mirrored=False):
+    """Fit the rigid motion that maps places of a scan to places of the tank.
 
     Parameters
     ----------
     own_m, there_m : ndarray, shape (n, 3)
+        Places in the frame of the scan and in the frame of the tank.
     scaled : bool
-        Whether a scale is estimated, too.
+        Whether to estimate a scale.
     mirrored : bool
-        Whether the one frame is left-handed.
+        Whether one frame is left-handed.
+
+    Returns
+    -------
+    Fit
 
     Examples
     --------
@@ -40,28 +45,40 @@ def fit_motion(own_m, there_m, *, scaled=False, mirrored=False):
     >>> round(found.scale, 6), round(found.rms_m, 9)
     (0.001, 0.0)
     """
-    middle, centre = own_m.mean(axis=0), there_m.mean(axis=0)
-    a, b = own_m - middle, there_m - centre
+    # Centring both sets separates the rotation from the translation.
+    middle, centre = scan_m.mean(axis=0), tank_m.mean(axis=0)
+    a, b = scan_m - middle, tank_m - centre
     u, size, v = np.linalg.svd(b.T @ a)
     turn = np.linalg.det(u) * np.linalg.det(v)
+    # Arun et al. 1987: the sign of the smallest singular direction selects rotation or reflection.
     sign = np.array([1.0, 1.0, -turn if mirrored else turn])
     rotation = (u * sign) @ v
+    # Least squares scale: trace(S D) over the sum of squared coordinates (Umeyama 1991).
     scale = float(sign @ size / max(np.sum(a**2), 1e-30)) if scaled else 1.0
     shift = centre - scale * rotation @ middle
-    left = there_m - scale * own_m @ rotation.T - shift
-    return Fit(rotation, shift, scale, float(np.sqrt(np.mean(np.sum(left**2, axis=1)))))
+    residuals = tank_m - scale * scan_m @ rotation.T - shift
+    return Fit(rotation, shift, scale, float(np.sqrt(np.mean(np.sum(residuals**2, axis=1)))))
 
 
-def refuse_misnamed(scan, own, there, names, sd_m):
-    """Raise SolutionError where targets fit far better mirrored, scaled or under other names.
+def refuse_misnamed(scan, scan_m, tank_m, names, sd_m):
+    """Raise SolutionError if targets fit far better mirrored, scaled or with exchanged names.
 
-    own, there  (n, 3) as the scan has them, and in the tank's frame
-    names, sd_m  (n,) of the targets
+    Parameters
+    ----------
+    scan : str
+    own, there : ndarray, shape (n, 3)
+        Places of the targets in the frame of the scan and in the frame of the tank, m.
+    names : sequence of str, length n
+    sd_m : array_like, shape (n,)
+        Standard deviations of the targets.
     """
-    plain = fit_motion(own, there).rms_m
+    plain = fit_motion(scan_m, tank_m).rms_m
     far_better = plain / FAR_BETTER
     limit = max(3 * float(np.max(sd_m)), 1e-6)
-    if len(own) > FEWEST and fit_motion(own, there, mirrored=True).rms_m < min(far_better, limit):
+    # Three points and their mirror image are congruent; only a fourth point shows the difference.
+    if len(scan_m) > FEWEST and fit_motion(scan_m, tank_m, mirrored=True).rms_m < min(
+        far_better, limit
+    ):
         text = message(
             "targets_mirrored",
             "the targets of scan {scan!r} fit as their mirror image only; expected a right-handed"
@@ -69,7 +86,7 @@ def refuse_misnamed(scan, own, there, names, sd_m):
             scan=scan,
         )
         raise SolutionError(text)
-    scaled = fit_motion(own, there, scaled=True)
+    scaled = fit_motion(scan_m, tank_m, scaled=True)
     if abs(scaled.scale - 1) > LEAST_CHANGE and scaled.rms_m < far_better:
         text = message(
             "targets_in_other_unit",
@@ -79,12 +96,13 @@ def refuse_misnamed(scan, own, there, names, sd_m):
             factor=1 / scaled.scale,
         )
         raise SolutionError(text)
+    # Try every exchange of two names.
     swaps = []
-    for i in range(len(own)):
-        for j in range(i + 1, len(own)):
-            order = np.arange(len(own))
+    for i in range(len(scan_m)):
+        for j in range(i + 1, len(scan_m)):
+            order = np.arange(len(scan_m))
             order[[i, j]] = j, i
-            swaps.append((fit_motion(own[order], there).rms_m, i, j))
+            swaps.append((fit_motion(scan_m[order], tank_m).rms_m, i, j))
     swaps.sort()
     if swaps and swaps[0][0] < min(far_better, limit):
         text = message(

@@ -1,4 +1,4 @@
-"""From what was measured to a network survey: names become numbers, repeated readings one."""
+"""Conversion of measurements to a network survey: names become numbers, repeated readings means."""
 
 from dataclasses import dataclass, replace
 
@@ -27,22 +27,30 @@ from tankcal.survey.readings import Numbers, bend_per_m, observations_of_reading
 from tankcal.survey.repeated_readings import reject_scattered
 
 AXES = "xyz"
-TOLD = 10  # points left out that are told one by one
+TOLD = 10  # warnings listed singly; further omitted points are only counted
 
 
 @dataclass(frozen=True)
 class Gathered:
-    """A survey before it has start values; its observations know which readings they are of.
+    """A survey without start values, whose observations keep a Trace to their readings.
 
-    survey   network.Survey: coordinates that are not known are nan; control acts as observations
-             and fixed coordinates with datum "control" only
-    checks   tuple of Observations that are compared, not adjusted
-    known    Known: control in the frame of the survey
-    idle     (points, 3) True: no observation touches this coordinate, it keeps its start
-    lost     {name: file} of points that cannot be adjusted
-    aside    sentences about them
-    warnings tuple of Problem
-    repeats  RepeatedReadings of image points, or None
+    Attributes
+    ----------
+    survey : network.Survey
+        Unknown coordinates are nan. Control is observed or fixed with datum "control" only.
+    checks : tuple of Observations
+        Compared, not adjusted.
+    known : Known
+        Control in the frame of the survey.
+    idle : ndarray of bool, shape (points, 3)
+        True: no observation determines this coordinate; it keeps its start value.
+    lost : dict
+        {name: file} of points that cannot be adjusted.
+    aside : tuple
+        Sentences about the lost points.
+    warnings : tuple of Problem
+    repeats : RepeatedReadings or None
+        Repeated readings of image points.
     """
 
     survey: Survey
@@ -57,9 +65,13 @@ class Gathered:
 
 @dataclass(frozen=True)
 class Known:
-    """Control coordinates (points, 3) and their sds in the frame of the survey, nan: none.
+    """Control coordinates and their standard deviations in the frame of the survey; nan: none.
 
-    row  {point: row of control.csv}
+    Attributes
+    ----------
+    xyz_m, sd_m : ndarray, shape (points, 3)
+    row : dict
+        {point: row of control.csv}.
     """
 
     xyz_m: np.ndarray
@@ -68,58 +80,80 @@ class Known:
 
 
 def gather(measurements):
-    """The Gathered of Measurements; raises InputError for what cannot be meant."""
+    """Convert Measurements to a Gathered survey.
+
+    Parameters
+    ----------
+    measurements : Measurements
+
+    Returns
+    -------
+    Gathered
+
+    Raises
+    ------
+    InputError
+        If measurements contradict each other or lack standard deviations.
+    """
     measurements, repeated, scattered = reject_scattered(measurements)
     excluded = {}
+    # Omitting a point removes observations of its neighbours, so repeat until every point has
+    # enough.
     while True:
-        found = _gathered(measurements, excluded)
-        poor = find_left_out(found.survey)
+        gathered = _gathered(measurements, excluded)
+        poor = find_left_out(gathered.survey)
         if not poor:
             break
         excluded |= poor
-    excluded = _unmeasured(measurements, found.survey.points, excluded)
+    excluded = _unmeasured(measurements, gathered.survey.points, excluded)
     where = {name: named_in(measurements, name) for name in excluded}
-    idle, warnings = find_untouched_coordinates(found.survey)
-    warnings += _of_excluded(excluded, where)
-    fixed = idle if found.survey.fixed is None else found.survey.fixed | idle
+    idle, warnings = find_untouched_coordinates(gathered.survey)
+    warnings += _omission_warnings(excluded, where)
+    # A coordinate without observation would make the normal matrix singular.
+    fixed = idle if gathered.survey.fixed is None else gathered.survey.fixed | idle
     return replace(
-        found,
-        survey=replace(found.survey, fixed=fixed),
+        gathered,
+        survey=replace(gathered.survey, fixed=fixed),
         idle=idle,
         lost={name: file for name, (file, _) in where.items()},
         aside=tuple(excluded.values()),
-        warnings=(*scattered, *found.warnings, *warnings),
+        warnings=(*scattered, *gathered.warnings, *warnings),
         repeats=repeated,
     )
 
 
-def _of_excluded(excluded, where):
-    """Problem rows of points left out {name: why}; of many, the first ones and how many more."""
-    found = [Problem(where[name][0], text, where[name][1]) for name, text in excluded.items()]
-    if len(found) <= TOLD:
-        return found
+def _omission_warnings(excluded, where):
+    """Problem rows of omitted points {name: reason}: the first ones, and the number of the
+    others."""
+    problems = [Problem(where[name][0], text, where[name][1]) for name, text in excluded.items()]
+    if len(problems) <= TOLD:
+        return problems
     text = message(
         "more_left_out",
         "further points are left out because they have too few observations: {points}",
         points=list_some(list(excluded)[TOLD - 1 :], TOLD),
     )
-    return [*found[: TOLD - 1], Problem("job.toml", text, None, "adjustment")]
+    return [*problems[: TOLD - 1], Problem("job.toml", text, None, "adjustment")]
 
 
 def _unmeasured(measurements, points, excluded):
-    """{name: why} of points left out, with those of control.csv and check.csv never measured."""
-    found = dict(excluded)
+    """{name: reason} of omitted points, including unmeasured points of control.csv and
+    check.csv."""
+    reasons = dict(excluded)
     for table in (measurements.control, measurements.check):
         for name in () if table is None else table.point:
-            if name not in points and name not in found:
-                found[name] = unmeasured_sentence(name)
-    return found
+            if name not in points and name not in reasons:
+                reasons[name] = unmeasured_sentence(name)
+    return reasons
 
 
 def named_in(measurements, name):
-    """File and row in which a point is named first."""
+    """File and row of the first occurrence of a point."""
     tables = [(measurements.image_points, ("point",)), (measurements.control, ("point",))]
-    tables += [(one, ("end", "start", "origin")) for one in measurements.readings]
+    tables += [
+        (table_of_readings, ("end", "start", "origin"))
+        for table_of_readings in measurements.readings
+    ]
     for table, columns in [*tables, (measurements.check, ("point",))]:
         for column in columns if table is not None else ():
             names = getattr(table, column)
@@ -129,6 +163,7 @@ def named_in(measurements, name):
 
 
 def _gathered(measurements, excluded):
+    """The Gathered of measurements without the excluded points."""
     warnings = []
     numbers = _numbers(measurements, excluded)
     known = _known(measurements.control, numbers.points)
@@ -136,6 +171,7 @@ def _gathered(measurements, excluded):
     fixed = None
     if measurements.settings.datum == "control":
         fixed = np.nan_to_num(known.sd_m, nan=1.0) == 0
+        # With another datum, control serves for start values and comparison only.
         fixed &= np.isfinite(known.xyz_m)
         alone = rows_of(measurements.correlated, "control")
         observations += _control(measurements.control, numbers.points, warnings, alone)
@@ -167,8 +203,8 @@ def _gathered(measurements, excluded):
 
 
 def _numbers(measurements, excluded):
-    """Numbers of everything that is measured, in the order in which the files name it."""
-    setups = {one.name: one for one in measurements.setups}
+    """Numbers of all measured items, in the order of their first occurrence."""
+    setups = {item.name: item for item in measurements.setups}
     points, sets, tools = {}, {}, {}
 
     def count(names):
@@ -193,20 +229,21 @@ def _numbers(measurements, excluded):
                 tool = table.instrument[i] if table.instrument else tool
                 if tool is not None:
                     tools.setdefault(tool, len(tools))
-    known = {one.name: one for one in measurements.instruments}
+    known = {item.name: item for item in measurements.instruments}
     return Numbers(points, setups, tools, known, sets)
 
 
 def _instruments(measurements, numbers):
-    """Instruments of the network, those that measured distances."""
-    found = [numbers.tools[name] for name in numbers.instruments]
+    """Instruments of the network that measured distances."""
+    used_tools = [numbers.tools[name] for name in numbers.instruments]
     return tuple(
-        Instrument(one.name, scale_sd=one.u_scale, offset_sd_m=one.u_offset_m) for one in found
+        Instrument(tool.name, scale_sd=tool.u_scale, offset_sd_m=tool.u_offset_m)
+        for tool in used_tools
     )
 
 
-def _own(control):
-    """Numbers of the rows of control in the frame of the survey that are not for checks."""
+def _rows_in_survey_frame(control):
+    """Row numbers of control in the frame of the survey, without check rows."""
     if control is None:
         return []
     systems = control.system or (None,) * len(control.point)
@@ -218,11 +255,13 @@ def _own(control):
 
 
 def _known(control, points):
+    """The Known control of the points of the survey."""
     xyz, sd = np.full((2, len(points), 3), np.nan)
     row = {}
-    for i in _own(control):
+    for i in _rows_in_survey_frame(control):
         number = points.get(control.point[i])
         if number is not None:
+            # A point may occur in several rows, each with some of its coordinates.
             new = np.isfinite(control.xyz_m[i])
             xyz[number, new], sd[number, new] = control.xyz_m[i, new], control.sd_m[i, new]
             row.setdefault(control.point[i], control.rows[i] if control.rows else None)
@@ -239,23 +278,25 @@ def _coordinates(control, rows, points):
 
 
 def _control(control, points, warnings, alone=frozenset()):
-    """The weighted control coordinates, as a list of one table or none."""
+    """Weighted control coordinates as a list of one table, or an empty list."""
     if control is None:
         return []
-    row, point, axis, value, sd = _coordinates(control, _own(control), points)
+    row, point, axis, value, sd = _coordinates(control, _rows_in_survey_frame(control), points)
     trace = _control_source(control, row, axis).trace()
-    one = ControlCoordinates(value, sd, point, axis, trace=trace).taken(sd > 0)
-    label = 3 * one.point + one.axis
-    if alone:  # values that are correlated with others are not averaged
-        mine = np.isin(one.trace.rows, list(alone))
-        label = np.where(mine, 3 * len(points) + np.arange(len(label)), label)
-    found = average_repeated(
-        one, label, warnings, name_of=lambda ids, element: f"{ids[0]} {element[0]}"
+    table = ControlCoordinates(value, sd, point, axis, trace=trace).taken(sd > 0)
+    label = 3 * table.point + table.axis
+    # Correlated values are not averaged: a mean would lose their covariance with other values.
+    if alone:
+        is_correlated = np.isin(table.trace.rows, list(alone))
+        label = np.where(is_correlated, 3 * len(points) + np.arange(len(label)), label)
+    averaged = average_repeated(
+        table, label, warnings, name_of=lambda ids, element: f"{ids[0]} {element[0]}"
     )
-    return [found] if len(found) else []
+    return [averaged] if len(averaged) else []
 
 
 def _control_source(control, rows, axis, group=()):
+    """Source of single coordinates of control."""
     return Source(
         control.file,
         tuple(control.rows[i] for i in rows) if control.rows else (),
@@ -266,7 +307,7 @@ def _control_source(control, rows, axis, group=()):
 
 
 def held_trace(known, points):
-    """The Trace of held coordinates, numbered 3 point + axis, of Known control."""
+    """Trace of held coordinates, numbered 3 point + axis."""
     return Source(
         "control.csv",
         tuple(known.row.get(name) for name in points for _ in AXES),
@@ -276,7 +317,7 @@ def held_trace(known, points):
 
 
 def _systems(control, points):
-    """Further systems, and a list of their coordinates."""
+    """Return further coordinate systems and a list of their coordinates."""
     if control is None:
         return (), []
     names = {}
@@ -294,12 +335,12 @@ def _systems(control, points):
     system = np.array([names[control.system[i]] for i in row])
     group = tuple(control.system[i] for i in row)
     trace = _control_source(control, row, axis, group=group).trace()
-    one = SystemCoordinates(value, sd, point, axis, system, trace=trace)
-    return tuple(System(name) for name in names), [one]
+    coordinates = SystemCoordinates(value, sd, point, axis, system, trace=trace)
+    return tuple(System(name) for name in names), [coordinates]
 
 
 def _images(measurements, points, order, warnings):
-    """The ImageCoordinates that are adjusted, and a list of those to compare."""
+    """Return the adjusted ImageCoordinates, and a list of those compared."""
     images = measurements.image_points
     sd = np.array(images.sd_mm, dtype=float)
     if measurements.settings.image_sd_mm is not None:
@@ -308,26 +349,29 @@ def _images(measurements, points, order, warnings):
     photo = np.array([order.get(name, -1) for name in images.photo], dtype=int)
     point = np.array([points.get(name, -1) for name in images.point], dtype=int)
     check = np.asarray(images.check, dtype=bool)
-    there = (photo >= 0) & (point >= 0)
+    is_usable = (photo >= 0) & (point >= 0)
     trace = _image_source(measurements).trace()
-    whole = ImageCoordinates(images.xy_mm, sd, point, photo, trace=trace)
-    used = whole.taken(there & ~check)
+    all_images = ImageCoordinates(images.xy_mm, sd, point, photo, trace=trace)
+    used = all_images.taken(is_usable & ~check)
     used = average_repeated(
         used, used.photo * len(points) + used.point, warnings,
         name_of=lambda ids, _: image_point_label(*ids),
     )  # fmt: skip
-    left = whole.taken(there & check)
-    used, left = (
-        one if images.shared_sd_mm is None
-        else replace(one, sd=np.hypot(one.sd, images.shared_sd_mm[one.trace.reading]))
-        for one in (used, left)
+    compared = all_images.taken(is_usable & check)
+    # The transformation error of a comparator is common to repeated readings, so it enters after
+    # averaging.
+    used, compared = (
+        part if images.shared_sd_mm is None
+        else replace(part, sd=np.hypot(part.sd, images.shared_sd_mm[part.trace.reading]))
+        for part in (used, compared)
     )  # fmt: skip
-    return used, [left] if len(left) else []
+    return used, [compared] if len(compared) else []
 
 
 def _image_source(measurements):
+    """Source of the image points, grouped by camera."""
     images = measurements.image_points
-    cameras = {one.name: one.camera for one in measurements.photos}
+    cameras = {item.name: item.camera for item in measurements.photos}
     return Source(
         images.file,
         images.rows,
@@ -338,6 +382,7 @@ def _image_source(measurements):
 
 
 def _refuse_missing_sd(images, sd):
+    """Raise InputError if an image point has no standard deviation."""
     missing = np.flatnonzero(np.isnan(sd).any(axis=1))
     if len(missing):
         row = images.rows[missing[0]] if images.rows else None

@@ -12,7 +12,7 @@ class Points:
     Attributes
     ----------
     names, rows : tuple
-        Text, and row of each in its file, for messages.
+        Name of each point, and its row in the file for messages.
     xyz_m : ndarray, shape (n, 3)
         Coordinates.
     sd_m : ndarray, shape (n, 3), or None
@@ -20,19 +20,19 @@ class Points:
     covariance_m2 : ndarray, shape (3n, 3n), or None
         None: not given.
     section, generatrix : tuple
-        Given name of each, text or None.
+        Section and generatrix of each point, text or None.
     causes : tuple
-        Named causes that the covariance contains (`survey.results.Cause`): covariance = the rest +
-        sum of column column', their columns over the coordinates of these points.
+        Named causes contained in the covariance (`survey.results.Cause`), with columns over the
+        coordinates of these points: covariance = remainder + sum of column column'.
     from_adjustment : bool
-        True: adjusted from a survey; the covariance has the scale that it should have.
+        True: adjusted from a survey; the covariance has its final scale.
     unbound : tuple
-        Causes that nothing has told yet (a free offset): not in the covariance, their columns are
-        derivatives.
+        Causes without an estimate (a free offset). They are not in the covariance; their columns
+        are derivatives.
     by_inputs : dict
-        {input of an uncertainty budget: (3n,) derivative of the coordinates by it}.
+        {input of an uncertainty budget: (3n,) derivative of the coordinates}.
     file : str
-        Where messages say they come from; "": of the rows.
+        Source of the points in messages; "": the file of the rows.
     """
 
     names: tuple

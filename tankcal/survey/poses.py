@@ -1,9 +1,9 @@
-"""Where the set-ups of wall hits stood: by the adjusted network, as the frame itself, or unknown.
+"""Poses of the set-ups of wall hits: from the adjusted network, as the frame, or unknown.
 
-Hits have no redundancy for a network: it is adjusted without them, and hands over its stations, the
-zeros of its circles, and scale and offset of its instruments with their whole covariance. A single
-set-up is the frame. Where each has a station of its own and none shares a target, the wall alone
-ties them: their places and the zeros of their circles are unknowns of the wall.
+Wall hits give a network no redundancy, so the network is adjusted without them. It supplies its
+stations, the zeros of its circles, and scale and offset of its instruments with their full
+covariance. A single set-up defines the frame. Set-ups on separate stations without common targets
+are tied by the wall only: their positions and circle zeros are unknowns of the wall.
 """
 
 from dataclasses import replace
@@ -17,26 +17,32 @@ from tankcal.survey.untied import place_untied
 
 
 def poses_of(hits, adjustment=None, *, nominal_m, is_inside):
-    """`Poses` of the set-ups of hits.
+    """Determine the poses of the set-ups of wall hits.
 
     Parameters
     ----------
     hits : WallHits
     adjustment : Adjustment, optional
-        Of the network that their set-ups belong to; None: there is none.
+        Adjusted network of the set-ups; None: no network.
     nominal_m : float
         Radius of the tank, m.
     is_inside : bool
-        Whether the set-ups are said to stand in the tank.
+        Whether the set-ups are declared to be inside the tank.
+
+    Returns
+    -------
+    Poses
 
     Raises
     ------
     InputError
-        For a set-up without a place that other sets of it tell.
+        If a set-up tied by the wall only has several sets of directions.
     """
     tools = tuple(dict.fromkeys(hits.instrument))
     known = [hits.instruments[name] for name in tools]
-    prior = np.array([[one.u_scale, np.nan_to_num(one.u_offset_m)] for one in known]).ravel() ** 2
+    prior = (
+        np.array([[tool.u_scale, np.nan_to_num(tool.u_offset_m)] for tool in known]).ravel() ** 2
+    )
     poses = _unplaced(hits, tools, prior)
     if adjustment is not None:
         poses = _in_network(hits, poses, adjustment)
@@ -48,22 +54,33 @@ def poses_of(hits, adjustment=None, *, nominal_m, is_inside):
 
 
 def poses_in_network(tangents, adjustment):
-    """`Poses` of the set-ups of tangents, with all instruments of the network, and the standard
-    deviations (scale, offset m) that these had beforehand; nan: free.
+    """Determine the poses of the set-ups of tangents from a network.
 
-    A set-up that the network does not have is tied by "wall": nothing knows where it stood.
+    A set-up outside the network has the tie "wall": its position is unknown.
+
+    Parameters
+    ----------
+    tangents : Tangents
+    adjustment : Adjustment
+
+    Returns
+    -------
+    poses : Poses
+        With all instruments of the network.
+    sds : tuple of (float, float)
+        A priori standard deviations (scale, offset m) of the instruments; nan: free.
     """
     known = adjustment.adjusted.survey.instruments
-    names = tuple(one.name for one in known)
+    names = tuple(tool.name for tool in known)
     poses = _unplaced(tangents, names, np.zeros(2 * len(names)))
     poses = replace(poses, ties=(WALL,) * len(poses.keys))
     return _in_network(tangents, poses, adjustment), tuple(
-        (one.scale_sd, one.offset_sd_m) for one in known
+        (tool.scale_sd, tool.offset_sd_m) for tool in known
     )
 
 
 def _unplaced(hits, tools, prior):
-    """Poses at the heights of their stations; the only set-up is the frame."""
+    """Poses at the heights of their stations; a single set-up defines the frame."""
     keys = tuple(dict.fromkeys(zip(hits.setup, hits.set, strict=True)))
     names = list(dict.fromkeys(name for name, _ in keys))
     count, xyz = 4 * len(keys), np.zeros((len(keys), 3))
@@ -87,29 +104,40 @@ def _unplaced(hits, tools, prior):
 
 
 def _in_network(hits, poses, adjustment):
-    """The poses with those of set-ups that the network has, and what it says of instruments."""
+    """Return the poses with values from the network where it contains their set-ups."""
     adjusted = adjustment.adjusted
-    tied, place, circle, mine, where = _numbers(hits, poses, adjustment)
+    tied, place, circle, tool_numbers, where = _numbers(hits, poses, adjustment)
     p, t = len(poses.keys), len(tied)
     covariance = poses.covariance.copy()
+    # Copy the joint block as a whole: it keeps the correlations of stations, circles and
+    # instruments.
     covariance[np.ix_(where, where)] = adjustment.cov_scale * adjusted.joint_covariance(
-        place, orientation_rad=circle, scale=mine, offset_m=mine
+        place, orientation_rad=circle, scale=tool_numbers, offset_m=tool_numbers
     )
     xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
     heights = np.array([hits.setups[poses.keys[i][0]].height_m for i in tied])
     xyz[tied] = adjusted.xyz_m[place] + heights[:, None] * [0, 0, 1]
     zero[tied] = adjusted.nuisance("orientation_rad")[circle]
     scale, offset = poses.scale.copy(), poses.offset_m.copy()
-    for at, number in zip((where[4 * t : 4 * t + len(mine)] - 4 * p) // 2, mine, strict=True):
-        scale[at], offset[at] = (adjusted.nuisance(of)[number] for of in ("scale", "offset_m"))
+    # `where` lists scale and offset of each instrument in turn, after the 4 p unknowns of poses.
+    for at, number in zip(
+        (where[4 * t : 4 * t + len(tool_numbers)] - 4 * p) // 2, tool_numbers, strict=True
+    ):
+        scale[at], offset[at] = (
+            adjusted.nuisance(parameter)[number] for parameter in ("scale", "offset_m")
+        )
     ties = [NETWORK if i in tied else WALL for i in range(p)]
     return Poses(poses.keys, xyz, zero, poses.instruments, scale, offset, covariance, tuple(ties))
 
 
 def settled(poses, change):
-    """The poses with those that the wall alone ties where it has them.
+    """Return the poses with the positions that the wall determined.
 
-    change  (k,) of x, y (m) and orientation (rad) of each of these, one after another
+    Parameters
+    ----------
+    poses : Poses
+    change : ndarray, shape (3 u,)
+        x, y (m) and orientation (rad) of each of the u poses tied by the wall.
     """
     if not np.any(change):
         return poses
@@ -121,23 +149,39 @@ def settled(poses, change):
 
 
 def covariance_with_points(hits, poses, adjustment, names):
-    """(u, 3 k) covariance of all that `Poses.covariance` is of with the coordinates of points of
-    the same network, by their names.
+    """Cross covariance of poses and instruments with points of the same network.
+
+    Parameters
+    ----------
+    hits : WallHits
+    poses : Poses
+    adjustment : Adjustment
+    names : sequence of str, length k
+
+    Returns
+    -------
+    ndarray, shape (u, 3 k)
+        u as in `Poses.covariance`.
     """
-    _, place, circle, mine, where = _numbers(hits, poses, adjustment)
+    _, place, circle, tool_numbers, where = _numbers(hits, poses, adjustment)
     numbers = dict(zip(adjustment.names, adjustment.there, strict=True))
-    beside = [numbers[one] for one in names]
-    whole = adjustment.cov_scale * adjustment.adjusted.joint_covariance(
-        [*beside, *place], orientation_rad=circle, scale=mine, offset_m=mine
+    beside = [numbers[name] for name in names]
+    joint = adjustment.cov_scale * adjustment.adjusted.joint_covariance(
+        [*beside, *place], orientation_rad=circle, scale=tool_numbers, offset_m=tool_numbers
     )
-    found = np.zeros((len(poses.covariance), 3 * len(beside)))
-    found[where] = whole[3 * len(beside) :, : 3 * len(beside)]
-    return found
+    cross = np.zeros((len(poses.covariance), 3 * len(beside)))
+    cross[where] = joint[3 * len(beside) :, : 3 * len(beside)]
+    return cross
 
 
 def _numbers(hits, poses, adjustment):
-    """What a network has of poses: which of them, numbers of their stations, of their circles and
-    of instruments there, and where all of these unknowns stand among those of `Poses`.
+    """Match poses with the unknowns of a network.
+
+    Returns
+    -------
+    tuple
+        Numbers of the tied poses, of their stations, circles and instruments in the network, and
+        the indices of all these unknowns in `Poses.covariance`.
     """
     survey = adjustment.adjusted.survey
     points = dict(zip(adjustment.names, adjustment.there, strict=True))
@@ -150,19 +194,27 @@ def _numbers(hits, poses, adjustment):
         i for i, (name, _) in enumerate(poses.keys) if stations[name] in points and name in first
     ]
     place = [points[stations[poses.keys[i][0]]] for i in tied]
+    # A set without directions in the network takes the first circle of its set-up.
     circle = [circles.get(poses.keys[i], first[poses.keys[i][0]]) for i in tied]
-    ranged = {one.name: number for number, one in enumerate(survey.instruments)}
+    ranged = {instrument.name: number for number, instrument in enumerate(survey.instruments)}
     tools = [i for i, name in enumerate(poses.instruments) if name in ranged]
-    mine = [ranged[poses.instruments[i]] for i in tools]
-    at = np.array(tied, dtype=int)
+    tool_numbers = [ranged[poses.instruments[i]] for i in tools]
+    pose_numbers = np.array(tied, dtype=int)
     tool = 4 * len(poses.keys) + 2 * np.array(tools, dtype=int)
-    stations = (4 * at[:, None] + np.arange(3)).ravel()
-    return at, place, circle, mine, np.concatenate([stations, 4 * at + 3, tool, tool + 1])
+    stations = (4 * pose_numbers[:, None] + np.arange(3)).ravel()
+    return (
+        pose_numbers,
+        place,
+        circle,
+        tool_numbers,
+        np.concatenate([stations, 4 * pose_numbers + 3, tool, tool + 1]),
+    )
 
 
 def _refuse_sets(hits, poses, untied):
-    """Raise InputError where an untied set-up has two sets: one zero of its circle is enough."""
-    names = [poses.keys[one][0] for one in untied]
+    """Raise InputError if an untied set-up has two sets, since the wall determines one circle
+    zero."""
+    names = [poses.keys[number][0] for number in untied]
     twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
     if twice:
         expected = message(

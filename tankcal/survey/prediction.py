@@ -1,4 +1,4 @@
-"""A survey predicted where it is planned: what its adjustment would give, without observations."""
+"""Prediction of a planned survey: the covariance of its adjustment, without observations."""
 
 from dataclasses import dataclass, replace
 
@@ -14,14 +14,14 @@ from tankcal.survey.start_values import finish_start_values
 
 @dataclass(frozen=True)
 class Nominal:
-    """Where things will stand.
+    """Planned positions.
 
     Attributes
     ----------
     points : dict
-        {name: (3,)} m, those of set-ups among them.
+        {name: (3,) coordinates, m}, including the set-ups.
     photos : dict
-        {name: ((3,) projection centre, (3, 3) rotation)}.
+        {name: ((3,) projection centre, m, (3, 3) rotation)}.
     """
 
     points: dict
@@ -30,16 +30,16 @@ class Nominal:
 
 @dataclass(frozen=True)
 class Predicted:
-    """A survey before it is made.
+    """Prediction of a survey.
 
     Attributes
     ----------
     adjusted : Adjusted
-        network.Adjusted at the nominal values; its residuals and sigma0 mean nothing.
+        network.Adjusted at the nominal values; its residuals and sigma0 have no meaning.
     gathered : Gathered
-        What cannot be determined is in `aside`.
+        Its `aside` lists points that cannot be determined.
     frame : Frame
-        What holds the datum.
+        Datum of the survey.
     """
 
     adjusted: Adjusted
@@ -48,17 +48,24 @@ class Predicted:
 
 
 def predict_survey(measurements, nominal):
-    """The Predicted of job.Measurements whose observed values do not matter.
+    """Predict the adjustment of a planned survey; observed values are ignored.
 
     Parameters
     ----------
-    nominal
-        Nominal; a point or photo without a place there is an InputError.
+    measurements : Measurements
+    nominal : Nominal
+        Planned positions.
+
+    Returns
+    -------
+    Predicted
 
     Raises
     ------
+    InputError
+        If a point or photo has no nominal position.
     SolutionError
-        When the survey would not determine what is asked for, in words.
+        If the survey does not determine the unknowns.
     """
     gathered = gather(measurements)
     if not gathered.survey.points:
@@ -73,10 +80,14 @@ def predict_survey(measurements, nominal):
 
 
 def place_at_nominal(survey, nominal):
-    """A network survey with the nominal values as its start values."""
+    """Return a network survey with nominal values as start values."""
     photos = survey.photos
     missing = [name for name in survey.points if name not in nominal.points]
-    missing += [one for one in (photos.names if photos else ()) if one not in nominal.photos]
+    missing += [
+        name_of_photo
+        for name_of_photo in (photos.names if photos else ())
+        if name_of_photo not in nominal.photos
+    ]
     if missing:
         expected = f"no nominal place is known of {', '.join(missing[:5])}"
         raise InputError(Problem("plan.toml", expected))

@@ -1,4 +1,4 @@
-"""From the readings of a table, with names, to observations, with arrays for the solver."""
+"""Conversion of a table of readings, with names, to observations, with arrays for the solver."""
 
 from dataclasses import dataclass, field, fields, replace
 
@@ -14,9 +14,18 @@ EARTH_RADIUS_M = 6_371_000.0
 class Numbers:
     """Numbers of points, instruments and sets of directions by the user's names.
 
-    points       {name: number}                  setups  {name: job.Setup}
-    instruments  {name: number}                  tools   {name: job.Instrument}
-    sets         {(set-up, set): number}
+    Attributes
+    ----------
+    points : dict
+        {name: number}.
+    setups : dict
+        {name: measurements.Setup}.
+    instruments : dict
+        {name: number}.
+    tools : dict
+        {name: measurements.Instrument}.
+    sets : dict
+        {(set-up, set): number}.
     """
 
     points: dict
@@ -27,33 +36,43 @@ class Numbers:
 
 
 def bend_per_m(refraction):
-    """(1 - k) / (2 R): how far the earth bends away, less what the line of sight does."""
+    """Earth curvature less refraction, (1 - k) / (2 R), 1/m; multiply by the distance squared."""
     return 0.0 if refraction is None else (1.0 - refraction) / (2.0 * EARTH_RADIUS_M)
 
 
 def certified_distance_m(reading_m, tool):
-    """Distance after an instrument's certificate: (reading + correction_m) (1 + correction)."""
+    """Distance after an instrument's certificate: (reading + correction_m) (1 + correction), m."""
     return (np.asarray(reading_m) + tool.correction_m) * (1.0 + tool.correction)
 
 
 def true_distance_m(reading_m, tool, temperature_c):
-    """Distance after the certificate of an instrument and its temperature.
-
-    Of a tape round the tank see `strapping.reduce_strap`.
+    """Distance after correction for the certificate of an instrument and its temperature.
 
         true = (reading + correction_m) (1 + correction) (1 + expansion (T - T_certified))
 
-    reading_m, temperature_c  (n,), nan: not given        tool  job.Instrument
+    `strapping.reduce_strap` corrects a tape round the tank.
+
+    Parameters
+    ----------
+    reading_m : ndarray, shape (n,)
+    tool : Instrument
+        measurements.Instrument.
+    temperature_c : ndarray, shape (n,)
+        nan: not given, no correction.
+
+    Returns
+    -------
+    ndarray, shape (n,)
     """
-    found = certified_distance_m(reading_m, tool)
+    certified = certified_distance_m(reading_m, tool)
     if tool.certified_temperature_c is None or not tool.expansion_per_k:
-        return found
+        return certified
     warmer = np.nan_to_num(np.asarray(temperature_c) - tool.certified_temperature_c)
-    return found * (1.0 + tool.expansion_per_k * warmer)
+    return certified * (1.0 + tool.expansion_per_k * warmer)
 
 
 def read_distance_m(true_m, tool):
-    """What an instrument reads of a true distance, at the temperature of its certificate.
+    """Reading of an instrument at a true distance, at the temperature of its certificate, m.
 
     Examples
     --------
@@ -62,61 +81,67 @@ def read_distance_m(true_m, tool):
     >>> float(true_distance_m(read_distance_m(7.0, tape), tape, np.nan))
     7.0
     """
-    zero, one = true_distance_m(np.array([0.0, 1.0]), tool, np.full(2, np.nan))
-    return (true_m - zero) / (one - zero)
+    # The correction is linear in the reading, so two values invert it.
+    at_zero, at_unit = true_distance_m(np.array([0.0, 1.0]), tool, np.full(2, np.nan))
+    return (true_m - at_zero) / (at_unit - at_zero)
 
 
 def observations_of_readings(readings, numbers, *, bend, warnings, correlated=frozenset()):
-    """The observations of a table of readings: those that are adjusted, those that are compared.
+    """Convert a table of readings to adjusted and compared observations.
 
-    Distances are corrected by the certificates of their instruments; repeated readings become one.
+    Distances are corrected by the certificates of their instruments; repeated readings are
+    averaged.
 
     Parameters
     ----------
     readings : Readings
         By the user's names, in SI.
     numbers : Numbers
-        Readings between points that have no number are left out.
+        Readings between points without a number are omitted.
     bend : float
-        Of the lines of sight, `bend_per_m`, 1/m.
+        Curvature of the lines of sight, see `bend_per_m`, 1/m.
     warnings : list of Problem
-        To which warnings of scatter are added.
+        Receives warnings of excessive scatter.
     correlated : frozenset of int
-        Rows of the file that are correlated with others: they are not averaged.
+        Rows of the file that are correlated with other rows; they are not averaged.
 
     Returns
     -------
     adjusted, compared : list of Observations
-        Each with the Trace of its readings; horizontal distances stand apart from spatial ones.
+        Each with the Trace of its readings; horizontal and spatial distances are separate.
     """
     single, averaged, compared = [], [], []
     kind = KINDS[readings.table]
     if not len(readings.value):
         return [], []
-    for one in _observed(readings, numbers, kind, bend):
-        check = np.asarray(readings.check, dtype=bool)[one.trace.reading]
-        alone = np.full(len(one), np.ndim(readings.value) > 1)  # correlated with one another
-        alone |= np.isin(one.trace.rows, list(correlated)) if correlated else False
-        compared.append(one.taken(check))
-        single.append(one.taken(~check & alone))
-        rest = one.taken(~check & ~alone)
+    for observations in _observed(readings, numbers, kind, bend):
+        check = np.asarray(readings.check, dtype=bool)[observations.trace.reading]
+        # Vectors have correlated components, so a weighted mean by components would be wrong.
+        alone = np.full(len(observations), np.ndim(readings.value) > 1)
+        alone |= np.isin(observations.trace.rows, list(correlated)) if correlated else False
+        compared.append(observations.taken(check))
+        single.append(observations.taken(~check & alone))
+        rest = observations.taken(~check & ~alone)
         averaged.append(average_repeated(rest, _labels(rest, kind), warnings, apart=True))
-    return [one for one in single + averaged if len(one)], [one for one in compared if len(one)]
+    return [observations for observations in single + averaged if len(observations)], [
+        observations for observations in compared if len(observations)
+    ]
 
 
 def _observed(readings, numbers, kind, bend):
-    """Observations of all readings between points that have numbers, one by one.
+    """Observations of all readings between numbered points, not averaged.
 
-    A table for spatial, one for horizontal distances; other kinds are one.
+    Distances give a spatial and a horizontal table; other kinds give one table.
     """
     n = len(readings.value)
     setups = [numbers.setups[name] for name in readings.setup]
-    start = [one.station for one in setups] if setups else readings.start
-    tools = [one.instrument for one in setups] if setups else readings.instrument
+    start = [occupation.station for occupation in setups] if setups else readings.start
+    tools = [occupation.instrument for occupation in setups] if setups else readings.instrument
     tools = tools if kind.has("instrument") and len(tools) else (None,) * n
-    heights = np.array([one.height_m for one in setups]) if setups else np.zeros(n)
+    heights = np.array([occupation.height_m for occupation in setups]) if setups else np.zeros(n)
     target = readings.target_height_m
     sets = readings.set or (None,) * n
+    # Heights of instrument and target reduce the sight to the marks.
     rise = heights - (0.0 if target is None else np.nan_to_num(target))
     columns = {
         "start": _numbered(start, numbers.points),
@@ -127,36 +152,37 @@ def _observed(readings, numbers, kind, bend):
         "rise_m": rise if rise.any() else None,
         "bend_per_m": bend,
     }
-    columns = {name: given for name, given in columns.items() if kind.has(name)} | kind.options
+    columns = {name: column for name, column in columns.items() if kind.has(name)} | kind.options
     value = np.array(readings.value, dtype=float)
     if kind.has("instrument"):
         value = _corrected(value, tools, readings.temperature_c, numbers.tools)
-    value, sd = (_of_rows(of, n, kind.observes.rows) for of in (value, readings.sd))
+    value, sd = (_as_rows(of, n, kind.observes.rows) for of in (value, readings.sd))
     trace = _source(readings, kind, tools).trace()
-    whole = kind.observes(value, sd, **columns, trace=trace)
-    numbered = (*whole.ties, "set") if kind.has("set") else whole.ties
-    known = np.all([getattr(whole, name) >= 0 for name in numbered], axis=0)
+    observations = kind.observes(value, sd, **columns, trace=trace)
+    numbered = (*observations.ties, "set") if kind.has("set") else observations.ties
+    known = np.all([getattr(observations, name) >= 0 for name in numbered], axis=0)
     if readings.horizontal is None:
-        return [whole.taken(known)]
+        return [observations.taken(known)]
     flat = np.asarray(readings.horizontal, dtype=bool)
     return [
-        replace(whole.taken(known & (flat == horizontal)), horizontal=horizontal)
+        replace(observations.taken(known & (flat == horizontal)), horizontal=horizontal)
         for horizontal in (False, True)
     ]
 
 
-def _of_rows(of, n, m):
-    """(n,) or, of several values a row, (n, m); one for all m where one is given."""
-    of = np.array(np.broadcast_to(np.asarray(of, dtype=float).reshape(n, -1), (n, m)))
-    return of[:, 0] if m == 1 else of
+def _as_rows(values, n, m):
+    """Reshape to (n,) or, with several values per row, (n, m); a single value applies to all m."""
+    values = np.array(np.broadcast_to(np.asarray(values, dtype=float).reshape(n, -1), (n, m)))
+    return values[:, 0] if m == 1 else values
 
 
 def _source(readings, kind, tools):
+    """Source of the readings, with the names of set-up or start, origin and end."""
     names = readings.setup or readings.start, readings.origin, readings.end
     return Source(
         file=readings.file,
         rows=tuple(readings.rows),
-        ids=tuple(zip(*(one for one in names if one), strict=True)),
+        ids=tuple(zip(*(column for column in names if column), strict=True)),
         element=(kind.elements,) * len(readings.value),
         group=tuple(tool or kind.group for tool in tools),
         table=readings.table,
@@ -164,19 +190,21 @@ def _source(readings, kind, tools):
 
 
 def _numbered(names, numbers):
+    """Numbers (n,) of the names; -1: without a number."""
     return np.array([numbers.get(name, -1) for name in names], dtype=int)
 
 
 def _corrected(value, tools, temperature_c, known):
+    """Distances (n,) after correction by the instruments, m."""
     temperature = np.full(len(value), np.nan) if temperature_c is None else temperature_c
     for name in set(tools) - {None}:
-        mine = np.array([tool == name for tool in tools])
-        value[mine] = true_distance_m(value[mine], known[name], temperature[mine])
+        is_of_tool = np.array([tool == name for tool in tools])
+        value[is_of_tool] = true_distance_m(value[is_of_tool], known[name], temperature[is_of_tool])
     return value
 
 
 def _labels(one, kind):
-    """(n,) the same number for readings of the same value; taped lines go either way."""
+    """Labels (n,), equal for readings of the same value; taped lines have no direction."""
     columns = {field.name: getattr(one, field.name) for field in fields(one)}
     for name in ("value", "sd", "use"):
         del columns[name]
@@ -184,7 +212,8 @@ def _labels(one, kind):
     if kind.either_way:
         ends = columns["start"], columns["end"]
         columns |= {"start": np.minimum(*ends), "end": np.maximum(*ends)}
-    else:  # two set-ups on one station see the same value twice
+    else:
+        # Two set-ups on one station are distinct, as their instrument heights differ.
         columns["from"] = np.array([names[0] for names in one.trace.ids], dtype=object)
     known = {}
     keys = zip(*(column.tolist() for column in columns.values()), strict=True)

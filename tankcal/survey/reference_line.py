@@ -1,16 +1,16 @@
 """Reference lines: offsets of a wall from vertical lines of sight round it, level by level.
 
-A line j at azimuth t stands upright but for the collimation kappa of its plummet. With dz the
-height above the reference level, R_i(t) the radius of level i about the axis of that level, and
-D_j a constant of the line,
+A line j at azimuth t is vertical except for the collimation kappa of its plummet. With dz the
+height above the reference level, R_i(t) the radius of level i about the axis of that level, and D_j
+a constant of the line,
 
     outside:  o_ij = D_j - R_i(t) + kappa dz,      inside:  o_ij = D_j + R_i(t) - kappa dz.
 
-Turned by half a turn (face 2) the plummet leans the other way: -kappa. A circle whose centre is
-off by e has R(t) = rho + e . n(t) - (e x n(t))^2 / (2 rho), so that the mean over even lines takes
-out lean and shape:
+In face 2 (rotated by half a turn) the plummet leans the opposite way: -kappa. A circle whose centre
+is displaced by e has R(t) = rho + e . n(t) - (e x n(t))^2 / (2 rho). The mean over evenly spaced
+lines therefore eliminates lean and shape:
 
-    rho_i = rho_0 + mean(o_0j - o_ij) + kappa dz  (outside; inside both signs turn).
+    rho_i = rho_0 + mean(o_0j - o_ij) + kappa dz  (outside; inside both signs change).
 
 Source: ISO 7507-2; API MPMS 2.2B (method).
 """
@@ -23,8 +23,8 @@ from tankcal.geometry.form import harmonics
 from tankcal.geometry.outlines import FULL_TURN
 
 ARCSEC = FULL_TURN / 1_296_000
-SAME_LEVEL_M = 0.02  # heights that are read as one level
-FEWEST_LINES = 4  # of a level: its radius, its centre, and one that controls them
+SAME_LEVEL_M = 0.02  # largest difference of heights regarded as one level
+FEWEST_LINES = 4  # lines per level: three for radius and centre, and one redundant
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,9 @@ class Line:
     instrument : str
         Name of a `Plummet`.
     inside : bool
-        Whether it stands in the tank.
+        Whether the line is inside the tank.
     row : int or None
-        In its file.
+        Row of the file.
     """
 
     name: str
@@ -52,22 +52,22 @@ class Line:
 
 @dataclass(frozen=True)
 class Offset:
-    """The wall's offset from a line, as read by a trolley.
+    """Offset of the wall from a line, read on a trolley.
 
     Attributes
     ----------
     line, course : str
     level_m : float
-        Above the table's zero.
+        Height above the zero of the table.
     offset_m, sd_m : float
     face : int
         1 or 2.
     reference : bool
         Whether it was read at the reference level.
     check : bool
-        Only compared.
+        True: compared only.
     row : int or None
-        In its file.
+        Row of the file.
     """
 
     line: str
@@ -83,7 +83,7 @@ class Offset:
 
 @dataclass(frozen=True)
 class Plummet:
-    """An instrument that makes upright lines, and the scale that is read from it.
+    """An instrument that defines vertical lines, with the scale of its readings.
 
     Attributes
     ----------
@@ -91,9 +91,9 @@ class Plummet:
     correction : float
         True length = reading (1 + correction).
     u_scale : float
-        Standard uncertainty of that, relative.
+        Relative standard uncertainty of the scale.
     u_collimation_rad : float or None
-        Of the collimation; None: both faces tell it.
+        Standard uncertainty of the collimation; None: estimated from both faces.
     certificate : str
     """
 
@@ -123,41 +123,43 @@ class ReferenceLines:
     plummets: dict = field(default_factory=dict)
 
     def of(self, offset):
-        """The `Line` that an offset was read from, and its `Plummet`."""
+        """Return the `Line` of an offset, and the `Plummet` of the line."""
         line = self.lines[offset.line]
         return line, self.plummets[line.instrument]
 
     @property
     def reference_m(self):
-        """Mean height of the reference level."""
-        return float(np.mean([one.level_m for one in self.offsets if one.reference]))
+        """Mean height of the reference level, m."""
+        return float(np.mean([offset.level_m for offset in self.offsets if offset.reference]))
 
     def radial_m(self, offset):
-        """What an offset says of the radius of the wall but for the constant of its line, m."""
+        """Radius of the wall minus the constant of the line, from an offset, m."""
         line, plummet = self.of(offset)
         size = offset.offset_m * (1 + plummet.correction)
+        # Outside, a larger offset means a smaller radius.
         return size if line.inside else -size
 
     def by_collimation_m(self, offset):
-        """Derivative of `radial_m` by the collimation, m per radian."""
+        """Derivative of `radial_m` by the collimation, m/rad."""
         upwards = offset.level_m - self.reference_m
+        # In face 2 the plummet leans the opposite way.
         return upwards if offset.face == 2 else -upwards
 
 
 @dataclass(frozen=True)
 class Level:
-    """What the readings of one level say by themselves.
+    """Radius and centre estimated from the readings of one level alone.
 
     Attributes
     ----------
     course : str
     level_m : float
     lines : int
-        That read it.
+        Number of lines read at the level.
     rise_m : float
-        Mean radius less that of the reference level, m.
+        Mean radius minus that of the reference level, m.
     centre_m : tuple of float
-        x and y of its centre, from that of the reference level.
+        x and y of its centre relative to the centre of the reference level, m.
     """
 
     course: str
@@ -169,7 +171,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Lean:
-    """Slope of the axis, m/m towards +x and +y, and its standard uncertainty; nan: not known."""
+    """Slope of the axis towards +x and +y, m/m, and its standard uncertainty; nan: unknown."""
 
     x: float
     y: float
@@ -177,15 +179,18 @@ class Lean:
 
 
 def courses_told(seen, strapped, read):
-    """Set of the courses whose radius is told: by points, by a tape, or carried there by lines.
+    """Set of the courses with a known radius: from points, a tape, or by transfer along lines.
 
-    A line carries the radius of each course that it reads to all others, so that one of them is
-    enough.
+    A line transfers the radius of one of its courses to all its other courses.
 
     Parameters
     ----------
     seen, strapped, read : set
         Courses with points, with straps, with offsets from reference lines.
+
+    Returns
+    -------
+    set
 
     Examples
     --------
@@ -194,96 +199,144 @@ def courses_told(seen, strapped, read):
     >>> sorted(courses_told({1}, set(), {2, 3}))
     [1]
     """
-    told = set(seen) | set(strapped)
-    return told | set(read) if told & set(read) else told
+    with_radius = set(seen) | set(strapped)
+    return with_radius | set(read) if with_radius & set(read) else with_radius
 
 
 def level_names(offsets):
-    """(n,) number of the level of each offset: those of a course within SAME_LEVEL_M are one."""
+    """Number (n,) of the level of each offset; heights of a course within SAME_LEVEL_M are one."""
     levels, numbers = [], []
-    for one in offsets:
-        known = (
+    for offset in offsets:
+        matches = (
             number
             for number, (course, level_m) in enumerate(levels)
-            if course == one.course and abs(level_m - one.level_m) <= SAME_LEVEL_M
+            if course == offset.course and abs(level_m - offset.level_m) <= SAME_LEVEL_M
         )
-        number = next(known, None)
+        number = next(matches, None)
         if number is None:
             number = len(levels)
-            levels.append((one.course, one.level_m))
+            levels.append((offset.course, offset.level_m))
         numbers.append(number)
     return np.array(numbers, dtype=int)
 
 
-def levels_of(given, offsets, collimations):
-    """`Level` of every level but the reference, by arithmetic that a reader can repeat.
+def levels_of(reference_lines, offsets, collimations):
+    """Estimate each level except the reference by arithmetic that a reader can repeat.
 
     Parameters
     ----------
     given : ReferenceLines
     offsets : sequence of Offset
-        Those that are believed.
+        Accepted offsets.
     collimations : dict
         {plummet: kappa, rad}.
+
+    Returns
+    -------
+    tuple of Level
+        From the bottom up; levels with too few lines are omitted.
     """
-    rises = rises_of(given, offsets, collimations)
-    levels = [_level(given, read) for read in rises if len(read) >= FEWEST_LINES - 1]
-    return tuple(sorted(levels, key=lambda one: one.level_m))
+    rises = rises_of(reference_lines, offsets, collimations)
+    # Three lines determine radius and centre.
+    levels = [
+        _level(reference_lines, rises_of_level)
+        for rises_of_level in rises
+        if len(rises_of_level) >= FEWEST_LINES - 1
+    ]
+    return tuple(sorted(levels, key=lambda level: level.level_m))
 
 
-def rises_of(given, offsets, collimations):
-    """Of each level but the reference [(line, rise over its reference, first offset there)], m.
+def rises_of(reference_lines, offsets, collimations):
+    """Rises of the wall over the reference level, by level and line.
 
-    given, offsets, collimations  as of `levels_of`
+    Parameters
+    ----------
+    given : ReferenceLines
+    offsets : sequence of Offset
+    collimations : dict
+        {plummet: kappa, rad}.
+
+    Returns
+    -------
+    tuple of list
+        For each level except the reference [(line, rise over the reference of the line in m, first
+        offset there)].
     """
     by_line, values = {}, {}
-    for one, number in zip(offsets, level_names(offsets), strict=True):
-        kappa = collimations.get(given.of(one)[0].instrument, 0.0)
-        radial = given.radial_m(one) - kappa * given.by_collimation_m(one)
-        if one.reference:
-            by_line.setdefault(one.line, []).append(radial)
+    for offset, number in zip(offsets, level_names(offsets), strict=True):
+        kappa = collimations.get(reference_lines.of(offset)[0].instrument, 0.0)
+        radial = reference_lines.radial_m(offset) - kappa * reference_lines.by_collimation_m(offset)
+        if offset.reference:
+            by_line.setdefault(offset.line, []).append(radial)
         else:
-            values.setdefault((number, one.line), []).append((radial, one))
-    found = {}
-    for (number, line), read in values.items():
+            values.setdefault((number, offset.line), []).append((radial, offset))
+    rises = {}
+    for (number, line), readings in values.items():
         if line in by_line:
-            rise = np.mean([radial for radial, _ in read]) - np.mean(by_line[line])
-            found.setdefault(number, []).append((line, rise, read[0][1]))
-    return tuple(found.values())
+            # The constant D_j of the line cancels in the difference from its reference.
+            rise = np.mean([radial for radial, _ in readings]) - np.mean(by_line[line])
+            rises.setdefault(number, []).append((line, rise, readings[0][1]))
+    return tuple(rises.values())
 
 
-def _level(given, read):
-    azimuth = np.array([given.lines[line].azimuth_rad for line, _, _ in read])
-    rises = np.array([rise for _, rise, _ in read])
+def _level(reference_lines, rises_of_level):
+    """Fit mean radius and centre of a level to its rises."""
+    azimuth = np.array([reference_lines.lines[line].azimuth_rad for line, _, _ in rises_of_level])
+    rises = np.array([rise for _, rise, _ in rises_of_level])
+    # Rise = mean + y cos t + x sin t; azimuths are clockwise from +y.
     mean, y, x = np.linalg.lstsq(harmonics(azimuth, 1), rises, rcond=None)[0]
-    level_m = float(np.mean([one.level_m for _, _, one in read]))
-    return Level(read[0][2].course, level_m, len(read), float(mean), (float(x), float(y)))
+    level_m = float(np.mean([offset.level_m for _, _, offset in rises_of_level]))
+    return Level(
+        rises_of_level[0][2].course, level_m, len(rises_of_level), float(mean), (float(x), float(y))
+    )
 
 
-def lean_of(given, levels):
-    """`Lean` of the straight axis through the centres of all levels.
+def lean_of(reference_lines, levels):
+    """Fit a straight axis to the centres of all levels.
 
-    Its uncertainty comes from the scatter of the centres about it: of two levels there is none.
+    Parameters
+    ----------
+    given : ReferenceLines
+    levels : sequence of Level
+
+    Returns
+    -------
+    Lean
+        Its uncertainty comes from the scatter of the centres; two levels leave it undetermined.
     """
-    heights = np.array([given.reference_m, *(one.level_m for one in levels)])
-    centres = np.array([(0.0, 0.0), *(one.centre_m for one in levels)])
+    heights = np.array([reference_lines.reference_m, *(level.level_m for level in levels)])
+    centres = np.array([(0.0, 0.0), *(level.centre_m for level in levels)])
+    # Heights relative to their mean decouple slope and intercept.
     design = np.column_stack([np.ones(len(heights)), heights - heights.mean()])
     spread = float(np.sum(design[:, 1] ** 2))
     if not spread:
         return Lean(np.nan, np.nan, np.nan)
-    found = np.linalg.lstsq(design, centres, rcond=None)[0]
-    free = 2 * (len(heights) - 2)
-    if not free:
-        return Lean(*map(float, found[1]), np.nan)
-    scatter = np.sum((centres - design @ found) ** 2) / free
-    return Lean(*map(float, found[1]), float(np.sqrt(scatter / spread)))
+    coefficients = np.linalg.lstsq(design, centres, rcond=None)[0]
+    # Two coordinates per centre; each axis estimates intercept and slope.
+    dof = 2 * (len(heights) - 2)
+    if not dof:
+        return Lean(*map(float, coefficients[1]), np.nan)
+    scatter = np.sum((centres - design @ coefficients) ** 2) / dof
+    return Lean(*map(float, coefficients[1]), float(np.sqrt(scatter / spread)))
 
 
-def collimation_by_faces(given, offsets, instrument):
-    """(kappa, its sd) of a plummet by the differences of its two faces alone, rad; None: one face.
+def collimation_by_faces(reference_lines, offsets, instrument):
+    """Estimate the collimation of a plummet from the differences of its two faces.
 
-    kappa = sum d dz / (2 sum dz^2) over the places read on both faces, d the difference of the
-    offsets outside; u = s / sqrt(2 N sum dz^2) with s the sd of a reading.
+    kappa = sum d dz / (2 sum dz^2) over the places read in both faces, with d the difference of the
+    outside offsets; u = s / sqrt(2 N sum dz^2) with s the standard deviation of a reading.
+
+    Parameters
+    ----------
+    given : ReferenceLines
+    offsets : sequence of Offset
+    instrument : str
+        Name of the plummet.
+
+    Returns
+    -------
+    tuple of (float, float) or None
+        kappa and its standard deviation, rad; None: no place was read in both faces.
 
     Examples
     --------
@@ -296,17 +349,26 @@ def collimation_by_faces(given, offsets, instrument):
     (6.19, 7.29)
     """
     places = {}
-    for one, number in zip(offsets, level_names(offsets), strict=True):
-        if given.lines[one.line].instrument == instrument:
-            faces = places.setdefault((one.line, number), ([], []))
-            faces[one.face - 1].append(one)
-    top = bottom = 0.0
-    for both in places.values():
-        if not all(both):
+    for offset, number in zip(offsets, level_names(offsets), strict=True):
+        if reference_lines.lines[offset.line].instrument == instrument:
+            faces = places.setdefault((offset.line, number), ([], []))
+            faces[offset.face - 1].append(offset)
+    numerator = denominator = 0.0
+    for pair in places.values():
+        if not all(pair):
             continue
-        apart = np.diff([np.mean([given.radial_m(one) for one in face]) for face in both])[0]
-        by = np.diff([np.mean([given.by_collimation_m(one) for one in face]) for face in both])[0]
-        weight = 1 / sum(np.mean([one.sd_m**2 for one in face]) / len(face) for face in both)
-        top += weight * by * apart
-        bottom += weight * by**2
-    return (float(top / bottom), float(bottom**-0.5)) if bottom else None
+        # The difference of the faces depends on kappa only: radius and line constant cancel.
+        difference = np.diff(
+            [np.mean([reference_lines.radial_m(offset) for offset in face]) for face in pair]
+        )[0]
+        derivative = np.diff(
+            [
+                np.mean([reference_lines.by_collimation_m(offset) for offset in face])
+                for face in pair
+            ]
+        )[0]
+        # Inverse variance of the difference of the two means.
+        weight = 1 / sum(np.mean([offset.sd_m**2 for offset in face]) / len(face) for face in pair)
+        numerator += weight * derivative * difference
+        denominator += weight * derivative**2
+    return (float(numerator / denominator), float(denominator**-0.5)) if denominator else None

@@ -1,14 +1,14 @@
-"""Poses of scans from the targets that they share with a survey and with one another.
+"""Poses of scans from targets shared with a survey and with other scans.
 
-A scan s delivers p, and a target t of it stands at
+A scan s measures p, and a target t of it has the position
 
-    X_t = c_s + exp(w_s) R_s b (d' - o) / ((1 + m) d),     b = p - (where the scanner stood),
+    X_t = c_s + exp(w_s) R_s b (d' - o) / ((1 + m) d),     b = p - (position of the scanner),
 
-d = |b|, d' that after the certificate, c_s the place of the scanner, w_s a small turn about the
-axes of the tank's frame, m the scale of the scanner, and o its offset on targets. All of it is one
-least squares problem: targets that a survey knows come with their whole covariance, those that
-scans alone share are unknowns, m and o come with their certificate. The offset on the wall's paint
-is not that on a target, so that o tells nothing of it.
+with d = |b|, d' the distance after the certificate, c_s the position of the scanner, w_s a small
+rotation about the axes of the tank, m the scale of the scanner, and o its offset on targets. One
+least squares adjustment estimates all poses. Surveyed targets enter with their full covariance,
+targets shared by scans only are unknowns, and m and o have the uncertainty of their certificate.
+The offset on paint differs from that on targets, so o does not determine the offset on the wall.
 
 Source: Mikhail & Ackermann 1976, ch. 9 (least squares); Arun et al. 1987 (start); Baarda 1968 (w).
 """
@@ -34,14 +34,13 @@ class TargetResidual:
     ----------
     scan, target : str
     residual_m : ndarray, shape (3,)
-        By the pose minus adjusted place of the target, in the frame of the tank.
+        Position by the pose minus adjusted position of the target, in the frame of the tank, m.
     w : float
-        Of the worst of its three coordinates: residual over its standard deviation; nan: the
-        target is not checked by anything.
+        Largest normalized residual of the three coordinates; nan: the target is not controlled.
     mdb_m : float
-        Smallest blunder that the test shows in 80 % of cases along each axis; inf: none.
+        Minimal detectable bias along each axis with a power of 80 %; inf: not detectable.
     removed : bool
-        Set aside; residual and w are then those that it would have.
+        True: rejected; residual and w are then predicted from the remaining targets.
     row : int or None
     """
 
@@ -56,22 +55,22 @@ class TargetResidual:
 
 @dataclass(frozen=True)
 class Registration:
-    """Poses of S scans and scales of K scanners, with all that they have in common.
+    """Poses of S scans and scales of K scanners, with their joint covariance.
 
     Attributes
     ----------
     scans : tuple of ScanSetup
     scanners : tuple of str
     place_m : ndarray, shape (S, 3)
-        Of each scanner, in the frame of the tank.
+        Position of each scanner in the frame of the tank.
     rotation : ndarray, shape (S, 3, 3)
-        From the scan's frame to that of the tank.
+        From the frame of the scan to that of the tank.
     scale : ndarray, shape (K,)
-        By how much more than its certificate says a scanner ranges too long, relative.
+        Relative excess of the measured ranges after correction by the certificate.
     covariance : ndarray, shape (6 S + K, 6 S + K)
-        Of place (m) and turn about x, y, z (rad) of each scan, then of the scales.
+        Of position (m) and rotation about x, y, z (rad) of each scan, then of the scales.
     ties : tuple of str
-        Of each scan: NETWORK (targets), FRAME (it is the frame itself) or DECLARED.
+        For each scan: NETWORK (targets), FRAME (it defines the frame) or DECLARED.
     residuals : tuple of TargetResidual
     dof : int
     chi2 : float
@@ -89,13 +88,14 @@ class Registration:
     chi2: float = 0.0
 
     def sd_of(self, scan):
-        """(translation m, rotation rad) of a scan: root of the mean variance of its axes."""
-        own = self.covariance.diagonal()[6 * scan : 6 * scan + 6]
-        return float(np.sqrt(own[:3].mean())), float(np.sqrt(own[3:].mean()))
+        """Standard deviations (translation m, rotation rad) of a scan: root mean variance of its
+        axes."""
+        variances = self.covariance.diagonal()[6 * scan : 6 * scan + 6]
+        return float(np.sqrt(variances[:3].mean())), float(np.sqrt(variances[3:].mean()))
 
 
 def register(scans, tools, targets=(), known=None):
-    """`Registration` of scans.
+    """Estimate the poses of scans.
 
     Parameters
     ----------
@@ -104,20 +104,20 @@ def register(scans, tools, targets=(), known=None):
         {scanner: RangingInstrument}.
     targets : sequence of ScanTarget
     known : KnownTargets, optional
-        Those that the survey of the tank knows.
+        Targets surveyed in the frame of the tank.
 
     Returns
     -------
     Registration
-        A scan that has three targets which tie it takes its pose from them alone, whatever was
-        declared; the others have the pose and the standard deviations that were declared. Where no
-        target is known, the first scan with declared ones is the frame.
+        A scan with three usable targets takes its pose from them alone and ignores its declared
+        pose. Other scans keep their declared pose and standard deviations. Without any known
+        target, the first declared scan defines the frame.
 
     Raises
     ------
     SolutionError
-        For targets that contradict one another so much that their names, their frame or their unit
-        must be wrong, and for a scan that nothing ties.
+        If the misfit of the targets can only come from wrong names, a wrong frame or a wrong unit,
+        or if a scan is not tied.
 
     Examples
     --------
@@ -130,65 +130,82 @@ def register(scans, tools, targets=(), known=None):
     """
     network = PoseNetwork(tuple(scans), tools, tuple(targets), known or KnownTargets())
     network.tie()
-    chosen = np.ones(len(network.targets), dtype=bool)
+    is_used = np.ones(len(network.targets), dtype=bool)
     try:
-        done = network.solve(chosen)
+        solution = network.solve(is_used)
     except SolutionError:
+        # A divergence may have a simple cause, which makes the better message.
         network.refuse_misnamed()
         raise
-    if done.dof > 0 and done.chi2 > chdtri(done.dof, ALPHA):
+    # Search for outliers only after the global test fails: single tests would also reject valid
+    # targets.
+    if solution.dof > 0 and solution.chi2 > chdtri(solution.dof, ALPHA):
         network.refuse_misnamed()
-        chosen, done = _without_blunders(network, chosen, done)
-    return _registration(network, done, chosen)
+        is_used, solution = _without_blunders(network, is_used, solution)
+    return _registration(network, solution, is_used)
 
 
-def _without_blunders(network, chosen, done):
-    """Which targets agree, and their solution: while one is over the limit, the worst goes."""
+def _without_blunders(network, is_used, solution):
+    """Reject the worst target repeatedly while one exceeds the limit; return mask and solution."""
     for _ in range(len(network.targets)):
-        w, _ = network.tests(chosen)
+        w, _ = network.tests(is_used)
         worst = int(np.argmax(np.nan_to_num(w)))
         if not np.nan_to_num(w)[worst] > CRITICAL:
             break
-        fewer = chosen.copy()
+        fewer = is_used.copy()
         fewer[worst] = False
         try:
-            done = network.solve(fewer)
+            solution = network.solve(fewer)
+        # The target is needed to determine a pose.
         except SolutionError:
             break
-        chosen = fewer
-    return chosen, done
+        is_used = fewer
+    return is_used, solution
 
 
-def _registration(network, done, chosen):
+def _registration(network, solution, is_used):
     """The `Registration` of the last solution of a `PoseNetwork`."""
     s, k = len(network.scans), len(network.scanners)
     _, state, cofactor = network.last
     pose = state[: 6 * s].reshape(s, 6)
+    # The state holds rotation vectors; the left Jacobian converts their covariance to rotations
+    # about the axes.
     by_tangent = scipy.linalg.block_diag(
-        *(block for one in pose for block in (np.eye(3), left_jacobian(one[None, 3:])[0])),
+        *(
+            block
+            for parameters in pose
+            for block in (np.eye(3), left_jacobian(parameters[None, 3:])[0])
+        ),
         np.eye(k),
     )
-    own = cofactor[: 6 * s + k, : 6 * s + k]
+    cofactor_of_poses = cofactor[: 6 * s + k, : 6 * s + k]
     return Registration(
         network.scans,
         network.scanners,
         pose[:, :3].copy(),
         apply_small_rotation(network.rotation, pose[:, 3:]),
         state[6 * s : 6 * s + k].copy(),
-        by_tangent @ own @ by_tangent.T,
+        by_tangent @ cofactor_of_poses @ by_tangent.T,
         tuple(network.ties),
-        _residuals(network, chosen),
-        done.dof,
-        float(done.chi2),
+        _residuals(network, is_used),
+        solution.dof,
+        float(solution.chi2),
     )
 
 
-def _residuals(network, chosen):
-    w, mdb = network.tests(chosen)
+def _residuals(network, is_used):
+    """TargetResidual of each target."""
+    w, mdb = network.tests(is_used)
     misclosure = network.misclosures()
     return tuple(
         TargetResidual(
-            one.scan, one.target, misclosure[i], float(w[i]), float(mdb[i]), not chosen[i], one.row
+            item.scan,
+            item.target,
+            misclosure[i],
+            float(w[i]),
+            float(mdb[i]),
+            not is_used[i],
+            item.row,
         )
-        for i, one in enumerate(network.targets)
+        for i, item in enumerate(network.targets)
     )

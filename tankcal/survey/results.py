@@ -1,4 +1,4 @@
-"""What the adjustment of a survey gave, by the names that the user gave to things."""
+"""Results of the adjustment of a survey, by the user's names."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,20 +15,31 @@ if TYPE_CHECKING:
     from tankcal.survey.measurements import RejectedReadings
     from tankcal.survey.network import Adjusted
 
-_SHOWN = 20  # points that an adjustment shows of itself
+_SHOWN = 20  # points listed in the HTML representation of an adjustment
 
 
 @dataclass(frozen=True)
 class GroupOfReadings:
-    """Is a group of observations as good as declared?
+    """Test of the declared standard deviations of a group of observations.
 
-    kind, name  such as "distance", "tape 1"; name "" where the kind says it all
-    count       values adjusted     removed     set aside
-    redundancy  of the group        factor      true sd over declared (variance component); nan:
-    factor_sd   its sd, if the      nothing controls the group
-                declaration holds
-    rms         of the residuals, in `unit`
-    sd_smallest, sd_largest         declared sds of the values adjusted; None: there are none
+    Attributes
+    ----------
+    kind, name : str
+        Such as "distance", "tape 1"; name "" where the kind is sufficient.
+    unit : str
+    count, removed : int
+        Number of adjusted values, and of rejected values.
+    redundancy : float
+        Redundancy of the group.
+    factor : float
+        Estimated over declared standard deviation (root of the variance component); nan: the group
+        is not controlled.
+    factor_sd : float
+        Standard deviation of the factor, if the declaration holds.
+    rms : float
+        Root mean square of the residuals, in `unit`.
+    sd_smallest, sd_largest : float or None
+        Range of the declared standard deviations of the adjusted values; None: no values.
     """
 
     kind: str
@@ -46,18 +57,18 @@ class GroupOfReadings:
 
 @dataclass(frozen=True)
 class DatumReport:
-    """What holds the frame.
+    """Datum of a survey.
 
     Attributes
     ----------
     choice : str
-        As asked for: "control", "fixed_photo", "minimal" or "inner".
+        Declared choice: "control", "fixed_photo", "minimal" or "inner".
     defect : int
-        Number of the seven ways that no observation feels, before the choice was applied.
+        Number of the seven datum parameters that the observations leave undetermined.
     words : Message
-        a sentence that names them; "" when the defect is 0.
+        Sentence that names the defect; "" when it is 0.
     held : tuple
-        What holds them: names of points with axes ("P7:z"), or of the photo.
+        Items that hold the datum: names of points with axes ("P7:z"), or of the photo.
     vertical : bool
         True: observations determine the vertical, whatever the choice.
     scale : bool
@@ -74,7 +85,7 @@ class DatumReport:
 
 @dataclass(frozen=True)
 class Dependence:
-    """What depends on the choice of the datum, and what does not.
+    """Quantities that depend on the choice of the datum, and quantities that do not.
 
     Attributes
     ----------
@@ -87,12 +98,13 @@ class Dependence:
 
 
 def datum_dependence(report):
-    """The Dependence of results on the choice of a datum.
+    """Determine which results depend on the choice of the datum.
 
-    A quantity does not depend on the choice when no motion or scaling that the observations leave
-    open changes it (`network.datum.depends_on_datum` tests single ones). Silva (1995) blamed
-    ill-conditioning for sds of 1.37 m with another fixed station: coordinates, and their sds, are
-    of the datum; the shape, and its sds, is not.
+    A quantity is independent if it is invariant under the motions or scaling that the observations
+    leave undetermined (`network.datum.depends_on_datum` tests single quantities). Silva (1995)
+    attributed standard deviations of 1.37 m with another fixed station to ill-conditioning.
+    Coordinates and their standard deviations belong to the datum; shape and its standard deviations
+    do not.
 
     Parameters
     ----------
@@ -110,6 +122,7 @@ def datum_dependence(report):
     (independent if report.scale else depends).extend(lengths)
     upright = ["heights above a level plane, tilt and plumb of the shell"]
     (independent if report.vertical else depends).extend(upright)
+    # A volume needs the scale, and the vertical for the heights of the table.
     volumes = ["volumes and the capacity table with their uncertainty"]
     (independent if report.scale and report.vertical else depends).extend(volumes)
     return Dependence(tuple(depends), tuple(independent))
@@ -117,12 +130,19 @@ def datum_dependence(report):
 
 @dataclass(frozen=True)
 class CheckPoints:
-    """Check points against the adjustment (Silva 5, 6); lengths in m.
+    """Comparison of check points with the adjustment (Silva 5, 6); lengths in m.
 
-    names          (n,)               difference_m  (n, 3) adjusted minus known; nan: not known
-    sd_m           (n, 3) of the difference: adjustment and known coordinates
-    r_xyz_m        root of the mean squared magnitude
-    largest_m      largest magnitude  mean_m        mean magnitude
+    Attributes
+    ----------
+    names : tuple, length n
+    difference_m : ndarray, shape (n, 3)
+        Adjusted minus known; nan: not known.
+    sd_m : ndarray, shape (n, 3)
+        Standard deviation of the difference, from adjustment and known coordinates.
+    r_xyz_m : float
+        Root mean square magnitude.
+    largest_m, mean_m : float
+        Largest and mean magnitude.
     """
 
     names: tuple
@@ -135,7 +155,7 @@ class CheckPoints:
 
 @dataclass(frozen=True)
 class Cause:
-    """A named, shared cause of uncertainty of the coordinates: scale or offset of an instrument.
+    """Named cause of uncertainty shared by coordinates: scale or offset of an instrument.
 
     Attributes
     ----------
@@ -144,13 +164,13 @@ class Cause:
     what : str
         "instrument_scale", "instrument_offset", "incidence" or "registration".
     u, unit
-        As declared: ppm or mm; None: it was computed. Several of one name and kind are one cause of
-        several columns.
+        Declared standard uncertainty in ppm or mm; None: computed. Causes of equal name and kind
+        are one cause with several columns.
     column_m : ndarray, shape (3 points,)
-        Change of all coordinates by one u, in the order of Adjustment.names; covariance = column
-        column' + everything else, uncorrelated.
+        Change of all coordinates by one u, in the order of Adjustment.names. Covariance = column
+        column' + an uncorrelated remainder.
     is_assumed : bool
-        Whether nobody declared it.
+        Whether u is assumed rather than declared.
     """
 
     name: str
@@ -163,12 +183,22 @@ class Cause:
 
 @dataclass(frozen=True)
 class RepeatedReadings:
-    """Repeated readings of image points, before anything was averaged.
+    """Repeated readings of image points, before averaging.
 
-    photo, point  (n,) names of the points read more than once      count  (n,) readings
-    mean_mm       (n, 2) without weights      sd_mm  (n, 2) of one reading, from the sample
-    limit_mm      sd beyond which readings were rejected; None: no limit
-    rejected      tuple of RejectedReadings, which are among the n
+    Attributes
+    ----------
+    photo, point : tuple, length n
+        Names of the points read more than once.
+    count : ndarray of int, shape (n,)
+        Number of readings.
+    mean_mm : ndarray, shape (n, 2)
+        Unweighted means.
+    sd_mm : ndarray, shape (n, 2)
+        Sample standard deviation of one reading.
+    limit_mm : float or None
+        Limit of sd_mm beyond which readings are rejected; None: no limit.
+    rejected : tuple of RejectedReadings
+        Rejected points among the n.
     """
 
     photo: tuple
@@ -181,22 +211,30 @@ class RepeatedReadings:
 
     @property
     def mean_sd_mm(self):
-        """(2,) mean of the standard deviations."""
+        """Mean (2,) of the standard deviations."""
         return self.sd_mm.mean(axis=0)
 
     @property
     def pooled_sd_mm(self):
-        """(2,) root of the mean variance, by degrees of freedom: sd of one reading of any point."""
+        """Pooled standard deviation (2,) of one reading, weighted by degrees of freedom."""
+        # Weighted by n - 1 of each point: sum (n - 1) s^2 / sum (n - 1).
         return np.sqrt((self.count - 1) @ self.sd_mm**2 / np.sum(self.count - 1))
 
 
 @dataclass(frozen=True)
 class DepthOfField:
-    """The outer iteration that corrects image points for the depth of their objects.
+    """Outer iteration that corrects image points for the depth of their objects.
 
-    rounds      adjustments made           last_change_mm  largest change of the last correction
-    largest_mm  largest correction (x or y)       rms_mm   root mean square of all of them
-    left        image readings left uncorrected: their objects have no depth in front of the lens
+    Attributes
+    ----------
+    rounds : int
+        Number of adjustments.
+    last_change_mm : float
+        Largest change of the last correction.
+    largest_mm, rms_mm : float
+        Largest correction (x or y), and root mean square of all corrections.
+    left : int
+        Uncorrected image readings, whose objects have no valid depth in front of the lens.
     """
 
     rounds: int
@@ -208,37 +246,37 @@ class DepthOfField:
 
 @dataclass(frozen=True, repr=False)
 class Adjustment:
-    """The adjusted survey. Covariances are scaled as `cov_scale` says.
+    """The adjusted survey. Covariances include the factor `cov_scale`.
 
     Attributes
     ----------
     adjusted : network.Adjusted
-        Numbers and covariances of everything, points by their number.
+        Values and covariances of all unknowns, points by number.
     there : ndarray of int, shape (n,)
-        Numbers of the points that could be adjusted.
+        Numbers of the adjusted points.
     aside : tuple of str
-        Sentences: points that could not be adjusted, and why.
+        Sentences: points that could not be adjusted, and the reasons.
     readings : Readings
-        A sequence of `Reading`, in the order of the files.
+        Sequence of `Reading`, in the order of the files.
     removed : tuple of Reading
-        Those that were set aside, the worst first.
+        Rejected readings, the worst first.
     groups : tuple of GroupOfReadings
     datum : DatumReport
     check_points : CheckPoints or None
     causes : tuple of Cause
-        Uncertainties that many points share, such as the scale of a tape.
+        Uncertainties shared by many points, such as the scale of a tape.
     cov_scale : float
-        Variance factor that covariances were multiplied by: 1, or sigma0 squared.
+        Variance factor of the covariances: 1, or sigma0 squared.
     rounds : int
-        Adjustments by data snooping.
+        Adjustments during data snooping.
     warnings : tuple of Problem
     doubts : tuple of Problem
-        Those of the warnings that put the whole result in doubt: what was set aside may be the
-        victim of what was kept, or another reading may be wrong in its place.
+        Warnings that question the whole result: a valid reading may have been rejected because of a
+        wrong one that was kept, or another reading may be wrong instead.
     repeats : RepeatedReadings or None
-        Of image points; None: each was read once.
+        Repeated readings of image points; None: each point was read once.
     depth : DepthOfField or None
-        None: not asked for.
+        None: not requested.
     """
 
     adjusted: "Adjusted"
@@ -259,27 +297,29 @@ class Adjustment:
 
     @cached_property
     def names(self) -> tuple:
-        """(n,) names of the points that were adjusted."""
+        """Names (n,) of the adjusted points."""
         return tuple(self.adjusted.survey.points[i] for i in self.there)
 
     @cached_property
     def xyz_m(self) -> np.ndarray:
-        """(n, 3) adjusted coordinates."""
+        """Adjusted coordinates (n, 3), m."""
         return self.adjusted.xyz_m[self.there]
 
     @cached_property
     def covariance_m2(self) -> np.ndarray:
-        """(n, 3, 3) covariance of each point; `full_covariance_m2` has all of them together."""
+        """Covariance (n, 3, 3) of each point; `full_covariance_m2` includes correlations of
+        points."""
         return self.cov_scale * self.adjusted.point_covariances_m2[self.there]
 
     @property
     def fixed(self) -> np.ndarray:
-        """(n, 3) True: was held."""
+        """Mask (n, 3), True for held coordinates."""
+        # Held coordinates have no column in the adjustment.
         return self.adjusted.problem.layout.points[self.there] < 0
 
     @property
     def sigma0(self) -> float:
-        """A posteriori; nan: no redundancy."""
+        """A posteriori sigma0; nan: no redundancy."""
         return self.adjusted.sigma0
 
     @property
@@ -330,7 +370,8 @@ class Adjustment:
 
     @property
     def points(self) -> dict:
-        """The adjusted points by columns, as `pandas.DataFrame` takes them: m, and sds in mm."""
+        """Columns of the adjusted points for `pandas.DataFrame`: m, and standard deviations in
+        mm."""
         sd_mm = 1000 * np.sqrt(np.einsum("nii->ni", self.covariance_m2))
         columns = {"point": list(self.names)}
         columns |= {f"{axis}_m": self.xyz_m[:, i] for i, axis in enumerate("xyz")}
@@ -339,10 +380,11 @@ class Adjustment:
     @property
     def dof(self):
         """Degrees of freedom of the covariances: infinite unless residuals scaled them."""
+        # A priori covariances do not depend on an estimated variance factor.
         return np.inf if self.cov_scale == 1 else float(self.redundancy)
 
     def full_covariance_m2(self, names=None):
-        """(3k, 3k) covariance of chosen points, all when None, scaled like the others."""
-        wanted = self.names if names is None else names
+        """Covariance (3k, 3k) of the named points, or of all when None, scaled by `cov_scale`."""
+        selection = self.names if names is None else names
         place = {name: i for i, name in enumerate(self.adjusted.survey.points)}
-        return self.cov_scale * self.adjusted.covariance_m2([place[name] for name in wanted])
+        return self.cov_scale * self.adjusted.covariance_m2([place[name] for name in selection])

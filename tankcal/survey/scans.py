@@ -1,6 +1,6 @@
-"""Scans of a wall as they were declared: where they stood, by which scanner, and their targets.
+"""Declared scans of a wall: position, scanner and targets of each scan.
 
-Angles are radians, lengths metres; nothing has been corrected or left out.
+Angles are in radians, lengths in metres; values are neither corrected nor omitted.
 """
 
 from dataclasses import dataclass, field
@@ -12,21 +12,21 @@ from tankcal.survey.wall_hits import RangingInstrument
 
 @dataclass(frozen=True)
 class ScanSetup:
-    """One scan: its scanner, and what was declared of its pose.
+    """A scan with its scanner and its declared pose.
 
     Attributes
     ----------
     name : str
-        Of the scan, once in the job.
+        Unique name of the scan.
     scanner : str
     surface : str
-        That it saw, "" for all the same: each has a bias by incidence of its own.
+        Surface scanned, "" if all are alike; each surface has its own incidence bias.
     pose : ndarray, shape (4, 4), or None
-        From the scan's frame to that of the tank, m; None: not given.
+        From the frame of the scan to that of the tank, m; None: not given.
     beam_from_m : ndarray, shape (3,)
-        Where the scanner stood, in the scan's own frame.
+        Position of the scanner in the frame of the scan.
     s_translation_m, s_rotation_rad : float
-        Of the pose along and about each axis of the tank's frame; nan: not declared.
+        Standard deviations of the pose along and about each axis of the tank; nan: not declared.
     is_assumed : bool
         Whether one of these is an assumption of the program.
     """
@@ -42,13 +42,13 @@ class ScanSetup:
 
     @property
     def is_declared(self):
-        """Are both standard deviations of its pose there?"""
+        """Whether both standard deviations of the pose are declared."""
         return not (np.isnan(self.s_translation_m) or np.isnan(self.s_rotation_rad))
 
 
 @dataclass(frozen=True)
 class ScanTarget:
-    """A target as a scan shows it: its place in the scan's own frame, the sd of each axis."""
+    """A target of a scan: its position in the frame of the scan, and the sd of each axis, m."""
 
     scan: str
     target: str
@@ -59,7 +59,7 @@ class ScanTarget:
 
 @dataclass(frozen=True)
 class KnownTargets:
-    """Targets whose places are known otherwise, by total station, say.
+    """Targets with known positions, for example from a total station.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class KnownTargets:
 
 @dataclass(frozen=True)
 class Scanners:
-    """Scanners by name, and which of them have an assumed offset or scale."""
+    """Scanners by name, and the scanners with an assumed offset or scale."""
 
     tools: dict[str, RangingInstrument]
     assumed: tuple = ()

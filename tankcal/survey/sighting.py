@@ -1,13 +1,13 @@
-"""Bare hits of a wall by a total station: no target, no name, each a place on the wall.
+"""Wall hits of a total station without targets or names; each hit is a point of the wall.
 
-From a set-up S whose circle has its zero at azimuth w, with a distance d as the certificate has it,
+From a set-up S whose circle has its zero at azimuth w, with distance d after the certificate,
 
     d' = (d - offset - q g(inc)) / (1 + scale),     g(inc) = 1 / cos(inc) - 1,
     hit = S + d' (sin zen sin(w + dir), sin zen cos(w + dir), cos zen),
 
-inc the angle between the sight and the wall's normal and q the bias of ranging at 60 degrees. What
-the hits of a set-up share, its place and the zero of its circle, and what all hits of an instrument
-share, scale, offset and q, are columns of their covariance: one unknown each.
+where inc is the angle between the sight and the normal of the wall, and q the ranging bias at 60
+degrees. The hits of a set-up share its position and circle zero; all hits of an instrument share
+scale, offset and q. Each of these unknowns is a column of the covariance of the hits.
 
 Source: ISO 7507-4; API MPMS 2.2D (method).
 """
@@ -21,30 +21,30 @@ from tankcal.survey.points import Points
 from tankcal.survey.readings import certified_distance_m
 from tankcal.survey.results import Cause
 
-NETWORK, FRAME, WALL = "network", "frame", "wall"  # what ties a set-up
-STEEPEST = np.cos(np.radians(85))  # of the incidence: beyond, 1 / cos says nothing
+NETWORK, FRAME, WALL = "network", "frame", "wall"  # tie of a set-up
+STEEPEST = np.cos(np.radians(85))  # largest incidence: beyond it 1 / cos has no meaning
 
 
 @dataclass(frozen=True)
 class Poses:
-    """Where instruments stood and where the zeros of their circles pointed; p poses, k instruments.
+    """Positions and circle zeros of instruments; p poses, k instruments.
 
     Attributes
     ----------
     keys : tuple of (str, str or None)
-        (set-up, set) of each.
+        (set-up, set) of each pose.
     xyz_m : ndarray, shape (p, 3)
-        Where their axes cross.
+        Intersections of the instrument axes.
     orientation_rad : ndarray, shape (p,)
-        Azimuth of the zero.
+        Azimuth of the circle zero.
     instruments : tuple of str
     scale, offset_m : ndarray, shape (k,)
-        As known: reading = (1 + scale) true + offset.
+        Estimates: reading = (1 + scale) true + offset.
     covariance : ndarray, shape (4 p + 2 k, 4 p + 2 k)
-        Of x, y, z, orientation of each pose, then of scale and offset of each instrument; 0 for an
-        offset that nothing has told, and for poses that the wall alone ties.
+        Of x, y, z, orientation of each pose, then of scale and offset of each instrument. It is 0
+        for an offset without estimate, and for poses tied by the wall only.
     ties : tuple of str
-        Of each pose: NETWORK, FRAME (it is the frame itself) or WALL (the wall alone).
+        Tie of each pose: NETWORK, FRAME (it defines the frame) or WALL (the wall alone).
     """
 
     keys: tuple
@@ -57,86 +57,95 @@ class Poses:
     ties: tuple
 
     def place_of(self, hits):
-        """(n,) place of the pose of each hit among these."""
+        """Index (n,) of the pose of each hit."""
         place = {key: i for i, key in enumerate(self.keys)}
         return np.array([place[key] for key in zip(hits.setup, hits.set, strict=True)])
 
 
 @dataclass(frozen=True)
 class Beside:
-    """Targets of the wall beside sights that name none.
+    """Targets on the wall, in addition to hits without names.
 
     Attributes
     ----------
     points : Points
-        k targets on the wall, as the network has them.
+        k targets on the wall, from the network.
     with_poses : ndarray, shape (u, 3 k)
-        Covariance of all that `Poses.covariance` is of with their coordinates, m2.
+        Covariance of the unknowns of `Poses.covariance` with the coordinates of the targets, m2.
     """
 
     points: Points
     with_poses: np.ndarray
 
     def after(self, sights, by_poses):
-        """`Points` of n sights, and then of the targets: with one covariance, and each cause once.
+        """Append the targets to n sights, with a joint covariance and each cause once.
 
-        by_poses  (3 n, u) derivative of the sights
+        Parameters
+        ----------
+        sights : Points
+        by_poses : ndarray, shape (3 n, u)
+            Derivative of the sights by the unknowns of `Poses.covariance`.
+
+        Returns
+        -------
+        Points
         """
-        own, count = self.points, len(sights.names)
+        targets, count = self.points, len(sights.names)
         across = by_poses @ self.with_poses
-        covariance = np.block([[sights.covariance_m2, across], [across.T, own.covariance_m2]])
-        more = 3 * len(own.names)
+        covariance = np.block([[sights.covariance_m2, across], [across.T, targets.covariance_m2]])
+        more = 3 * len(targets.names)
 
         def longer(column):
             return np.pad(column, (0, more))
 
-        causes = {(one.name, one.what): replace(one, column_m=longer(one.column_m))
-                  for one in sights.causes}  # fmt: skip
-        for one in own.causes:
-            key, column = (one.name, one.what), np.pad(one.column_m, (3 * count, 0))
-            known = causes.get(key)
-            both = column if known is None else known.column_m + column
-            causes[key] = replace(known or one, column_m=both)
+        causes = {(item.name, item.what): replace(item, column_m=longer(item.column_m))
+                  for item in sights.causes}  # fmt: skip
+        for item in targets.causes:
+            key, column = (item.name, item.what), np.pad(item.column_m, (3 * count, 0))
+            shared_cause = causes.get(key)
+            # A shared cause moves sights and targets together, so its columns are added.
+            joint_column = column if shared_cause is None else shared_cause.column_m + column
+            causes[key] = replace(shared_cause or item, column_m=joint_column)
         return replace(
             sights,
-            names=sights.names + own.names,
-            xyz_m=np.vstack([sights.xyz_m, own.xyz_m]),
+            names=sights.names + targets.names,
+            xyz_m=np.vstack([sights.xyz_m, targets.xyz_m]),
             covariance_m2=covariance,
-            section=sights.section + own.section,
-            generatrix=sights.generatrix + own.generatrix,
-            rows=sights.rows + (None,) * len(own.names),
+            section=sights.section + targets.section,
+            generatrix=sights.generatrix + targets.generatrix,
+            rows=sights.rows + (None,) * len(targets.names),
             causes=tuple(causes.values()),
-            unbound=tuple(replace(one, column_m=longer(one.column_m)) for one in sights.unbound),
-            by_inputs={name: longer(one) for name, one in sights.by_inputs.items()},
+            unbound=tuple(replace(item, column_m=longer(item.column_m)) for item in sights.unbound),
+            by_inputs={name: longer(item) for name, item in sights.by_inputs.items()},
         )
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """Hits as points, and how they came about.
+    """Hits as points of the wall, with the data of their reduction.
 
     Attributes
     ----------
     points : Points
-        Of all n hits; those that are only compared are among them. Of a `Result` without their
-        covariance, which may be half a gigabyte: `sight` makes it of hits and poses.
+        All n hits, including those compared only. In a `Result` they have no covariance, which may
+        need half a gigabyte; `sight` recomputes it from hits and poses.
     poses : Poses
     pose : ndarray of int, shape (n,)
-        Of each hit.
+        Index of the pose of each hit.
     incidence_rad : ndarray, shape (n,)
-        Between the sight and the wall's normal, from the circle through all hits in plan.
+        Angle between the sight and the normal of the circle through all hits in plan.
     is_inside : ndarray of bool, shape (n,)
-        Whether its set-up stands within that circle.
+        Whether the set-up is within that circle.
     normal : ndarray, shape (n, 3)
-        Of that circle, outwards.
+        Outward normal of that circle.
     told_m : dict
-        {instrument: offset that the wall told of it}, m, as it was taken off.
+        {instrument: offset estimated from the wall and already subtracted, m}.
     told : tuple of ToldCause
-        What the wall says of offsets and scales; (): it was not asked yet.
+        Offsets and scales estimated from the wall; (): not estimated yet.
     by_poses : ndarray, shape (3 n, u)
-        Derivative of the points by all that `Poses.covariance` is of.
+        Derivative of the points by the unknowns of `Poses.covariance`.
     beside : Beside or None
-        Targets of the wall from the same network.
+        Targets on the wall from the same network.
     """
 
     points: Points
@@ -152,24 +161,24 @@ class Sighting:
 
 
 def sight(hits, poses, told_m=None):
-    """`Sighting` of hits from known poses.
+    """Compute the points of hits from known poses.
 
     Parameters
     ----------
     hits : WallHits
     poses : Poses
     told_m : dict, optional
-        {instrument: offset that the wall has told of it}, m.
+        {instrument: offset estimated from the wall, m}.
 
     Returns
     -------
     Sighting
-        Its points with their full covariance; an offset that nothing has told, and poses that the
-        wall alone ties, are not in it, but among the `unbound` of the points.
+        Its points have their full covariance. Offsets without estimate and poses tied by the wall
+        only are excluded from it and listed in `unbound` of the points.
     """
     told_m = told_m or {}
-    told = np.array([told_m.get(name, 0.0) for name in poses.instruments])
-    poses = replace(poses, offset_m=poses.offset_m + told)
+    offsets_m = np.array([told_m.get(name, 0.0) for name in poses.instruments])
+    poses = replace(poses, offset_m=poses.offset_m + offsets_m)
     pose = poses.place_of(hits)
     tool = np.array([poses.instruments.index(name) for name in hits.instrument])
     distance = (certified_m(hits) - poses.offset_m[tool]) / (1 + poses.scale[tool])
@@ -177,19 +186,20 @@ def sight(hits, poses, told_m=None):
     ray, by_azimuth, by_zenith = rays(azimuth, hits.zenith_rad)
     xyz = poses.xyz_m[pose] + distance[:, None] * ray
     cosine, inside, normal = incidence_in_plan(xyz, poses.xyz_m[pose], ray)
-    # by x, y, z, orientation of each pose, then by scale and offset of each instrument
+    # Derivatives by x, y, z, orientation of each pose, then by scale and offset of each instrument.
     n, p, k = len(hits), len(poses.keys), len(poses.instruments)
-    by = np.zeros((n, 3, 4 * p + 2 * k))
-    one = np.arange(n)
+    jacobian = np.zeros((n, 3, 4 * p + 2 * k))
+    indices = np.arange(n)
     for axis in range(3):
-        by[one, axis, 4 * pose + axis] = 1.0
+        jacobian[indices, axis, 4 * pose + axis] = 1.0
     along = distance[:, None] * by_azimuth
-    by[one, :, 4 * pose + 3] = along
+    jacobian[indices, :, 4 * pose + 3] = along
     stretch = 1 + poses.scale[tool]
-    by[one, :, 4 * p + 2 * tool] = -(distance / stretch)[:, None] * ray
-    by[one, :, 4 * p + 2 * tool + 1] = -ray / stretch[:, None]
-    by = by.reshape(3 * n, -1)
-    own = np.stack(
+    jacobian[indices, :, 4 * p + 2 * tool] = -(distance / stretch)[:, None] * ray
+    jacobian[indices, :, 4 * p + 2 * tool + 1] = -ray / stretch[:, None]
+    jacobian = jacobian.reshape(3 * n, -1)
+    # Independent errors: along the ray (distance), in zenith angle, and in direction.
+    own_error = np.stack(
         [
             hits.sd_m[:, None] * ray,
             hits.sd_rad[:, None] * distance[:, None] * by_zenith,
@@ -197,13 +207,15 @@ def sight(hits, poses, told_m=None):
         ],
         axis=2,
     )
-    causes, unbound = _causes(hits, poses, by, tool, ray, cosine)
-    unbound += _of_untied(poses, by)
+    causes, unbound = _causes(hits, poses, jacobian, tool, ray, cosine)
+    unbound += _causes_of_untied(poses, jacobian)
     biases = [cause.column_m for cause in causes if cause.what == "incidence"]
+    # Factored as (J Q | biases) (J | biases)': one product instead of two.
     covariance = (
-        np.column_stack([by @ poses.covariance, *biases]) @ np.column_stack([by, *biases]).T
+        np.column_stack([jacobian @ poses.covariance, *biases])
+        @ np.column_stack([jacobian, *biases]).T
     )
-    covariance.reshape(n, 3, n, 3)[one, :, one] += own @ own.transpose(0, 2, 1)
+    covariance.reshape(n, 3, n, 3)[indices, :, indices] += own_error @ own_error.transpose(0, 2, 1)
     points = Points(
         names=tuple(f"{name} {row}" for name, row in zip(hits.setup, _rows(hits), strict=True)),
         xyz_m=xyz,
@@ -217,7 +229,9 @@ def sight(hits, poses, told_m=None):
         unbound=tuple(unbound),
         file=hits.file,
     )
-    return Sighting(points, poses, pose, np.arccos(cosine), inside, normal, told_m, by_poses=by)
+    return Sighting(
+        points, poses, pose, np.arccos(cosine), inside, normal, told_m, by_poses=jacobian
+    )
 
 
 def _rows(hits):
@@ -225,29 +239,51 @@ def _rows(hits):
 
 
 def certified_m(hits):
-    """(n,) distances of hits after the certificates of their instruments."""
+    """Distances (n,) of hits after the certificates of their instruments, m."""
     read = zip(hits.distance_m, hits.instrument, strict=True)
-    return np.array([certified_distance_m(one, hits.instruments[name]) for one, name in read])
+    return np.array(
+        [certified_distance_m(distance, hits.instruments[name]) for distance, name in read]
+    )
 
 
 def rays(azimuth_rad, zenith_rad):
-    """(n, 3) direction of each sight, and its derivatives by azimuth and zenith angle."""
+    """Unit vectors (n, 3) of sights, and their derivatives by azimuth and zenith angle."""
     sin, cos = np.sin(azimuth_rad), np.cos(azimuth_rad)
     down, up = np.sin(zenith_rad), np.cos(zenith_rad)
     ray = np.column_stack([down * sin, down * cos, up])
+    # Derivatives of (sin z sin a, sin z cos a, cos z) by a and z.
     by_azimuth = np.column_stack([down * cos, -down * sin, np.zeros_like(up)])
     return ray, by_azimuth, np.column_stack([up * sin, up * cos, -down])
 
 
 def bias_by_incidence(cosine):
-    """(n,) g = 1 / cos(incidence) - 1: 1 at 60 degrees, and no more than at 85 degrees."""
+    """Bias function g = 1 / cos(incidence) - 1, shape (n,): 1 at 60 degrees, constant above 85
+    degrees."""
+    # The clipped cosine keeps the bias finite at grazing incidence.
     return 1 / np.maximum(cosine, STEEPEST) - 1
 
 
 def incidence_in_plan(xyz, station, ray):
-    """(n,) cosine of the incidence, whether the station is within the circle through all, and
-    (n, 3) its normal.
+    """Incidence of sights on the circle through all hits in plan.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Hits, m.
+    station : ndarray, shape (n, 3)
+        Position of the instrument of each hit, m.
+    ray : ndarray, shape (n, 3)
+        Unit vectors of the sights.
+
+    Returns
+    -------
+    cosine : ndarray, shape (n,)
+    inside : ndarray of bool, shape (n,)
+        Whether the station is within the circle.
+    normal : ndarray, shape (n, 3)
+        Outward horizontal unit normals.
     """
+    # Centring on the median limits rounding in the squares of the circle fit.
     middle = np.median(xyz[:, :2], axis=0)
     x, y, radius = taubin_circle(xyz[:, :2] - middle)
     centre = middle + [x, y]
@@ -258,8 +294,8 @@ def incidence_in_plan(xyz, station, ray):
     return np.clip(cosine, 0, 1), inside, np.pad(normal, ((0, 0), (0, 1)))
 
 
-def _causes(hits, poses, by, tool, ray, cosine):
-    """Causes that hits share, as the covariance has them, and those that nothing binds."""
+def _causes(hits, poses, jacobian, tool, ray, cosine):
+    """Return the causes contained in the covariance of hits, and the unbound causes."""
     causes, unbound, p = [], [], len(poses.keys)
     for i, name in enumerate(poses.instruments):
         known = hits.instruments[name]
@@ -269,32 +305,35 @@ def _causes(hits, poses, by, tool, ray, cosine):
         ):
             if np.isnan(u):
                 if poses.covariance[at, at] == 0:
-                    unbound.append(Cause(name, what, np.inf, unit, by[:, at]))
-            elif u > 0:  # by what a shift of the value known beforehand does to all
-                column = by @ poses.covariance[:, at] / u
+                    unbound.append(Cause(name, what, np.inf, unit, jacobian[:, at]))
+            elif u > 0:
+                # Effect of one a priori standard uncertainty after the adjustment: J Q e / u.
+                column = jacobian @ poses.covariance[:, at] / u
                 causes.append(Cause(name, what, factor * u, unit, column))
         if known.u_incidence_m:
-            causes += _of_surfaces(hits, known, tool == i, ray, cosine)
+            causes += _incidence_causes(hits, known, tool == i, ray, cosine)
     return causes, unbound
 
 
-def _of_untied(poses, by):
-    """x, y and orientation of poses that the wall alone ties: unknowns of the wall."""
+def _causes_of_untied(poses, jacobian):
+    """Causes of x, y and orientation of poses tied by the wall only: unknowns of the wall."""
     return [
-        Cause(name, "pose", np.inf, unit, by[:, 4 * i + k])
+        Cause(name, "pose", np.inf, unit, jacobian[:, 4 * i + k])
         for i, ((name, _), tie) in enumerate(zip(poses.keys, poses.ties, strict=True))
         if tie == WALL
         for k, unit in ((0, "m"), (1, "m"), (3, "rad"))
     ]
 
 
-def _of_surfaces(hits, known, mine, ray, cosine):
-    """Of the bias by incidence: one unknown for each surface that an instrument saw."""
-    bias = known.u_incidence_m * bias_by_incidence(cosine)
-    surface, found = np.array([one or "" for one in hits.surface]), []
-    for one in dict.fromkeys(surface[mine].tolist()):
-        column = (np.where(mine & (surface == one), -bias, 0.0)[:, None] * ray).ravel()
+def _incidence_causes(hits, tool, is_of_tool, ray, cosine):
+    """One incidence cause for each surface measured by an instrument."""
+    bias = tool.u_incidence_m * bias_by_incidence(cosine)
+    surface, causes = np.array([name_of_surface or "" for name_of_surface in hits.surface]), []
+    for name_of_surface in dict.fromkeys(surface[is_of_tool].tolist()):
+        column = (
+            np.where(is_of_tool & (surface == name_of_surface), -bias, 0.0)[:, None] * ray
+        ).ravel()
         if np.any(column):
-            name = f"{known.name} {one}".strip()
-            found.append(Cause(name, "incidence", 1e3 * known.u_incidence_m, "mm", column))
-    return found
+            name = f"{tool.name} {name_of_surface}".strip()
+            causes.append(Cause(name, "incidence", 1e3 * tool.u_incidence_m, "mm", column))
+    return causes

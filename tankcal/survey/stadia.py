@@ -1,6 +1,6 @@
-"""A stadia: the horizontal distance to a bar of known length, from the angle between its ends.
+"""Stadia method: horizontal distance to a bar of known length from the angle between its ends.
 
-    d = (b / 2) cot(beta / 2)            the bar is level and square to the sight
+    d = (b / 2) cot(beta / 2)            the bar is level and perpendicular to the sight
     dd / dbeta = -b / (4 sin^2(beta / 2))
 
 Source: ISO 7507-3, clause 11 (the base of a triangulation).
@@ -10,19 +10,19 @@ import numpy as np
 
 
 def distance_of_angle_m(angle_rad, length_m):
-    """Distance to a bar that is seen under an angle.
+    """Distance to a bar from the angle that it subtends.
 
     Parameters
     ----------
     angle_rad : array_like
-        Between the ends of the bar, rad.
+        Angle between the ends of the bar, rad.
     length_m : array_like
-        Of the bar, m.
+        Length of the bar, m.
 
     Returns
     -------
     ndarray or float
-        Horizontal distance to its middle, m.
+        Horizontal distance to the middle of the bar, m.
 
     Examples
     --------
@@ -33,7 +33,7 @@ def distance_of_angle_m(angle_rad, length_m):
 
 
 def angle_of_distance_rad(distance_m, length_m):
-    """Angle under which a bar is seen: `distance_of_angle_m`, turned round.
+    """Angle subtended by a bar, rad; the inverse of `distance_of_angle_m`.
 
     Examples
     --------
@@ -44,17 +44,19 @@ def angle_of_distance_rad(distance_m, length_m):
 
 
 def distance_sd_m(angle_rad, length_m, angle_sd_rad):
-    """Standard deviation of the distance by that of its angle.
+    """Standard deviation of the distance caused by the angle.
 
     Parameters
     ----------
-    angle_rad, length_m, angle_sd_rad : array_like
-        As above; standard deviation of the angle, rad.
+    angle_rad, length_m : array_like
+        As in `distance_of_angle_m`.
+    angle_sd_rad : array_like
+        Standard deviation of the angle, rad.
 
     Returns
     -------
     ndarray or float
-        m.
+        Standard deviation, m.
 
     Examples
     --------

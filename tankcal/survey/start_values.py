@@ -1,4 +1,4 @@
-"""Start values of a gathered survey: control, nominal tank, and what the observations give."""
+"""Start values of a gathered survey, from control, the nominal tank and the observations."""
 
 from dataclasses import replace
 
@@ -12,20 +12,32 @@ from tankcal.survey.readings import bend_per_m
 from tankcal.survey.start.approximation import approximate, nominal_places
 from tankcal.survey.start.pieces import similarity
 
-MIRRORED_BETTER = 0.3  # a reflection is believed when it leaves less than this share
+MIRRORED_BETTER = 0.3  # misfit ratio below which a reflection is accepted
 
 
 def plan_fit(points, source, target):
-    """Points (n, 3) turned and shifted in plan, shifted in height, as source fits target (k, 3).
+    """Fit points by a rotation in plan and a shift in three dimensions.
 
-    Turned over (a reflection in plan) when that fits far better and three points say so. Returns
-    the points and the largest distance that is left.
+    A reflection in plan is used if it fits far better and at least three points confirm it.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+    source, target : ndarray, shape (k, 3)
+        Corresponding places in both frames.
+
+    Returns
+    -------
+    points : ndarray, shape (n, 3)
+        In the frame of target.
+    misfit : float
+        Largest distance between corresponding places.
     """
     return _plan_fit(points, source, target, -1.0 if turned_over(source, target) else 1.0)
 
 
 def turned_over(source, target):
-    """Whether a reflection in plan brings points (k, 3) far better onto others than a turn."""
+    """Whether a reflection in plan maps points (k, 3) onto others far better than a rotation."""
     if len(source) < 3:
         return False
     straight, over = (_plan_fit(source, source, target, side)[1] for side in (1.0, -1.0))
@@ -33,9 +45,11 @@ def turned_over(source, target):
 
 
 def _plan_fit(points, source, target, side):
+    """`plan_fit` with a given side: 1 rotation, -1 reflection."""
     flip = np.array([side, 1.0, 1.0])
     middle, goal = (source * flip).mean(axis=0), target.mean(axis=0)
     a, b = source * flip - middle, target - goal
+    # Complex numbers make the least squares rotation the argument of a sum of products.
     u, v = a[:, 0] + 1j * a[:, 1], b[:, 0] + 1j * b[:, 1]
     turn = np.sum(np.conj(u) * v)
     turn = turn / abs(turn) if abs(turn) > 0 else 1.0
@@ -48,48 +62,72 @@ def _plan_fit(points, source, target, side):
     return moved(points), float(np.linalg.norm(moved(source) - target, axis=1).max())
 
 
-TRUST_M = 0.01  # sd of control while start values are sought
-AGREES = 0.1  # of the radius: nominal coordinates further from control are in no common frame
+TRUST_M = 0.01  # sd of control in the search for start values
+AGREES = 0.1  # share of the radius within which nominal coordinates agree with control
 
 
 def add_start_values(gathered, measurements):
-    """The network survey with start values for all its unknowns.
+    """Return the network survey with start values for all unknowns.
 
-    Control decides the frame; nominal coordinates are brought into it. Photos and points without
-    values get them from the observations. Raises SolutionError naming what has none.
+    Control determines the frame; nominal coordinates are transformed to it. Photos and points
+    without values receive them from the observations.
+
+    Parameters
+    ----------
+    gathered : Gathered
+    measurements : Measurements
+
+    Returns
+    -------
+    network.Survey
+
+    Raises
+    ------
+    SolutionError
+        If unknowns remain without start value; the message names them.
     """
     survey, known = gathered.survey, gathered.known.xyz_m
     failure = None
     observations = survey.observations + _trusted(survey, known, measurements.settings)
     for xyz, photos in _attempts(survey, known, measurements):
         try:
-            found = approximate(
+            started = approximate(
                 replace(survey, xyz_m=xyz, photos=photos, observations=observations)
             )
         except SolutionError as error:
+            # The first attempt is the most credible, so its message is reported.
             failure = failure or error
             continue
-        found = replace(found, observations=survey.observations)
-        return finish_start_values(found, gathered, measurements)
+        started = replace(started, observations=survey.observations)
+        return finish_start_values(started, gathered, measurements)
     raise failure
 
 
 def started_like(adjusted, gathered, measurements):
-    """The survey started from another one of the same points and photos that was adjusted.
+    """Start a survey from an adjusted survey of the same points and photos.
 
-    None when it is not of the same, or when that one lost a point.
+    Parameters
+    ----------
+    adjusted : network.Adjusted
+    gathered : Gathered
+    measurements : Measurements
+
+    Returns
+    -------
+    network.Survey or None
+        None if the points differ or the adjustment lost a point.
     """
-    survey, other = gathered.survey, adjusted.survey
+    survey, previous = gathered.survey, adjusted.survey
     photos = () if survey.photos is None else survey.photos.names
-    same = survey.points == other.points and len(survey.sets) == len(other.sets)
-    same = same and photos == (() if other.photos is None else other.photos.names)
-    if not same or not np.isfinite(adjusted.xyz_m).all():
+    is_alike = survey.points == previous.points and len(survey.sets) == len(previous.sets)
+    is_alike = is_alike and photos == (() if previous.photos is None else previous.photos.names)
+    if not is_alike or not np.isfinite(adjusted.xyz_m).all():
         return None
     return finish_start_values(started_from(survey, adjusted), gathered, measurements)
 
 
 def _trusted(survey, known, settings):
-    """Control as observations, for start values only, where the datum does not let it act."""
+    """Control as observations for the start values, where the datum does not use it."""
     point, axis = np.nonzero(np.isfinite(known))
     if settings.datum == "control" or not len(point):
         return ()
@@ -97,7 +135,7 @@ def _trusted(survey, known, settings):
 
 
 def _attempts(survey, known, measurements):
-    """Start coordinates and photos to try, the most trusted first."""
+    """Yield start coordinates and photos to try, the most reliable first."""
     nominal = nominal_points(measurements, survey.points)
     idle = survey.fixed & np.isnan(known)
     base = np.where(idle, 0.0, known)
@@ -107,6 +145,8 @@ def _attempts(survey, known, measurements):
         if placed is not None:
             choices.append(np.where(np.isnan(base), placed, base))
     control = np.isfinite(known).all(axis=1).sum()
+    # More than three control points that contradict the nominal tank outweigh it; otherwise try the
+    # tank first.
     choices.insert(0 if control > 3 and nominal is not None and placed is None else 1, base)
     if nominal is not None and placed is None:
         choices.append(np.where(np.isnan(base), nominal, base))
@@ -114,6 +154,7 @@ def _attempts(survey, known, measurements):
     for xyz in choices:
         yield xyz, photos
     if photos is not None and np.isfinite(photos.xyz_m).any():
+        # Given photos may be wrong: last, try without their values.
         unknown = replace(
             photos,
             xyz_m=np.full_like(photos.xyz_m, np.nan),
@@ -124,7 +165,18 @@ def _attempts(survey, known, measurements):
 
 
 def nominal_points(measurements, points):
-    """Nominal coordinates (points, 3) of targets with generatrices 1 to n; None without a tank."""
+    """Nominal coordinates of targets with generatrices numbered from 1.
+
+    Parameters
+    ----------
+    measurements : Measurements
+    points : sequence of str
+
+    Returns
+    -------
+    ndarray, shape (points, 3), or None
+        nan where unknown; None without a nominal tank or generatrices.
+    """
     targets, tank = measurements.targets, measurements.nominal
     if targets is None or tank is None:
         return None
@@ -135,16 +187,17 @@ def nominal_points(measurements, points):
     z = np.array(targets.z_m, dtype=float)
     if np.isfinite(section).any():
         bottom = 0.0 if tank.bottom_z_m is None else tank.bottom_z_m
+        # Without a measured height, sections are assumed evenly spaced from the bottom.
         z_nominal = bottom + tank.height_m * (section - 0.5) / np.nanmax(section)
         z = np.where(np.isnan(z), z_nominal, z)
-    found = nominal_places(generatrix, np.nanmax(generatrix), z, tank.radius_m)
-    place = dict(zip(targets.point, found, strict=True))
+    places = nominal_places(generatrix, np.nanmax(generatrix), z, tank.radius_m)
+    place = dict(zip(targets.point, places, strict=True))
     nowhere = np.full(3, np.nan)
     return np.array([place.get(name, nowhere) for name in points])
 
 
 def mirrored_targets(xyz_m, points, measurements):
-    """Problem rows when adjusted points (points, 3) are a mirror image of the nominal tank."""
+    """Problem rows if adjusted points (points, 3) are a mirror image of the nominal tank."""
     nominal = nominal_points(measurements, points)
     if nominal is None:
         return []
@@ -161,12 +214,12 @@ def mirrored_targets(xyz_m, points, measurements):
 
 
 def _whole(name):
-    """The number that a name is, or nan."""
+    """Value of a name that is a whole number, or nan."""
     return float(name) if name is not None and str(name).strip().isdigit() else np.nan
 
 
 def _in_frame_of(known, nominal, radius_m):
-    """Nominal coordinates in the frame of control; None when the two cannot be brought together."""
+    """Nominal coordinates in the frame of control; None if they cannot be fitted."""
     common = np.isfinite(known).all(axis=1) & np.isfinite(nominal).all(axis=1)
     if not common.any():
         return None if np.isfinite(known).all(axis=1).any() else nominal
@@ -179,10 +232,22 @@ def _in_frame_of(known, nominal, radius_m):
 
 
 def finish_start_values(survey, gathered, measurements):
-    """A survey with starts: known coordinates as given, systems, the earth's bend."""
+    """Complete start values: known coordinates, systems, and curvature of the earth.
+
+    Parameters
+    ----------
+    survey : network.Survey
+    gathered : Gathered
+    measurements : Measurements
+
+    Returns
+    -------
+    network.Survey
+    """
     known, photos = gathered.known.xyz_m, survey.photos
     acting = survey.fixed & np.isfinite(known)
     xyz = np.where(acting | (gathered.idle & np.isfinite(known)), known, survey.xyz_m)
+    # A coordinate without observation does not affect the others; 0 keeps the equations finite.
     xyz = np.where(gathered.idle & np.isnan(xyz), 0.0, xyz)
     survey = replace(survey, xyz_m=xyz)
     if photos is not None:
@@ -191,29 +256,30 @@ def finish_start_values(survey, gathered, measurements):
     return _bent(survey, gathered, measurements)
 
 
-def _with_fixed(photos, given):
-    """Photos with their fixed elements at the values given."""
-    held = given.fixed[:, :3] & np.isfinite(given.xyz_m)
-    turned = given.fixed[:, 3] & np.isfinite(given.rotation).all(axis=(1, 2))
+def _with_fixed(photos, original):
+    """Photos with their fixed elements at the given values."""
+    is_fixed = original.fixed[:, :3] & np.isfinite(original.xyz_m)
+    turned = original.fixed[:, 3] & np.isfinite(original.rotation).all(axis=(1, 2))
     return replace(
         photos,
-        xyz_m=np.where(held, given.xyz_m, photos.xyz_m),
-        rotation=np.where(turned[:, None, None], given.rotation, photos.rotation),
-        fixed=given.fixed,
+        xyz_m=np.where(is_fixed, original.xyz_m, photos.xyz_m),
+        rotation=np.where(turned[:, None, None], original.rotation, photos.rotation),
+        fixed=original.fixed,
     )
 
 
 def _systems(survey):
-    """Systems with start values of their transformations, from points that both frames know."""
-    found = list(survey.systems)
-    for one in survey.observations:
-        if not isinstance(one, SystemCoordinates):
+    """Systems with start values of their transformations, from points known in both frames."""
+    completed = list(survey.systems)
+    for coordinates in survey.observations:
+        if not isinstance(coordinates, SystemCoordinates):
             continue
         for number, system in enumerate(survey.systems):
-            rows = np.flatnonzero(one.system == number)
+            rows = np.flatnonzero(coordinates.system == number)
             theirs = np.full((len(survey.points), 3), np.nan)
-            theirs[one.point[rows], one.axis[rows]] = one.value[rows]
+            theirs[coordinates.point[rows], coordinates.axis[rows]] = coordinates.value[rows]
             common = np.isfinite(theirs).all(axis=1) & np.isfinite(survey.xyz_m).all(axis=1)
+            # A rigid transformation needs three points.
             if common.sum() < 3:
                 raise SolutionError(
                     message(
@@ -224,23 +290,25 @@ def _systems(survey):
                         count=common.sum(),
                     )
                 )
-            here, there = survey.xyz_m[common], theirs[common]
-            rotation = similarity(here, there).rotation
-            shift = there.mean(axis=0) - rotation @ here.mean(axis=0)
-            found[number] = replace(system, rotation=rotation, shift_m=shift)
-    return tuple(found)
+            here, xyz_of_system = survey.xyz_m[common], theirs[common]
+            rotation = similarity(here, xyz_of_system).rotation
+            shift = xyz_of_system.mean(axis=0) - rotation @ here.mean(axis=0)
+            completed[number] = replace(system, rotation=rotation, shift_m=shift)
+    return tuple(completed)
 
 
 def _bent(survey, gathered, measurements):
-    """Slope distances with the earth's bend (less refraction) among the rises of their sights."""
+    """Slope distances with the curvature of the earth (less refraction) added to the rise of
+    their sights."""
     bend = bend_per_m(measurements.settings.refraction)
     if not bend:
         return survey
     observations = list(survey.observations)
-    for number, one in enumerate(observations):
-        slope = isinstance(one, Distances) and not one.horizontal
-        if slope and one.trace.table == "slope_distances":
-            rise = 0.0 if one.rise_m is None else one.rise_m
-            line = (survey.xyz_m[one.end] - survey.xyz_m[one.start])[:, :2]
-            observations[number] = replace(one, rise_m=rise + bend * np.sum(line**2, axis=1))
+    for number, distances in enumerate(observations):
+        slope = isinstance(distances, Distances) and not distances.horizontal
+        if slope and distances.trace.table == "slope_distances":
+            # Curvature depends on approximate coordinates only, so it is computed once, here.
+            rise = 0.0 if distances.rise_m is None else distances.rise_m
+            line = (survey.xyz_m[distances.end] - survey.xyz_m[distances.start])[:, :2]
+            observations[number] = replace(distances, rise_m=rise + bend * np.sum(line**2, axis=1))
     return replace(survey, observations=tuple(observations))

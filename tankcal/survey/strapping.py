@@ -4,8 +4,8 @@
     length = (reading + correction_mm) (1 + correction) (1 + a (T - T_cert)) (1 + strain)
     circumference = length - pi d - sum of excesses - sag,   d the thickness of the tape
 
-A warm or a stretched tape reads too little, one that hangs free over a span too much. A tape whose
-temperature nobody read lies on the shell and has that of the shell.
+A warm or stretched tape reads too little; a tape that hangs freely over a span reads too much. A
+tape without a measured temperature lies on the shell and has the temperature of the shell.
 
 Source: ISO 7507-1:2003; API MPMS 2.2A (methods); the formulas of excesses follow from plane
 geometry: a tape leaves a round shell on the two tangents from an edge.
@@ -18,17 +18,17 @@ import numpy as np
 from tankcal.survey.tape_tension import sag_of, strain_of
 
 KINDS = ("butt_strap", "weld", "step", "lap", "step_over", "measured", "sag")
-# what is assumed where a job says nothing: half-widths of rectangular distributions
-TAPE_TEMPERATURE_K = 2.0  # of a tape whose own temperature was read
-TENSION_SHARE = 0.1  # of the pull
-FRICTION_SHARE = 0.5  # of the coefficient
-WEIGHT_SHARE = 0.05  # of the weight of a metre
+# Values assumed where a job declares none: half-widths of rectangular distributions.
+TAPE_TEMPERATURE_K = 2.0  # of a measured tape temperature
+TENSION_SHARE = 0.1  # of the pull, relative
+FRICTION_SHARE = 0.5  # of the coefficient of friction, relative
+WEIGHT_SHARE = 0.05  # of the weight per metre, relative
 RECTANGULAR = np.sqrt(3.0)
 
 
 @dataclass(frozen=True)
 class Tape:
-    """A tape as its certificate has it; None: not said.
+    """A tape with the data of its certificate; None: not given.
 
     Attributes
     ----------
@@ -36,17 +36,17 @@ class Tape:
     correction, correction_m : float
         True length = (reading + correction_m) (1 + correction).
     temperature_c, tension_n : float or None
-        That the certificate is for.
+        Reference conditions of the certificate.
     expansion_per_k, thickness_m, friction : float
-        Friction 0: a tension is that round the whole tank; else it is that of the pull.
+        Friction 0: a tension applies round the whole tank; otherwise it is the pull at the ends.
     stiffness_n : float
-        Section times Young's modulus; inf: it does not stretch.
+        Cross section times Young's modulus; inf: no elastic strain.
     weight_n_per_m : float
         For the sag of free spans.
     u_scale, u_offset_m, laying_m : float
-        Standard uncertainties; of the laying for each pull.
+        Standard uncertainties; laying_m applies to each pull.
     master : str
-        Tape that it was compared with, whose certificate then counts; "": its own.
+        Tape of the comparison, whose certificate then applies; "": own certificate.
     certificate : str
     """
 
@@ -69,7 +69,7 @@ class Tape:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A length read by the master and by the working tape."""
+    """A length read with both the master tape and the working tape."""
 
     level: str
     master_m: float
@@ -80,11 +80,14 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Obstruction:
-    """What keeps a tape off the shell; lengths in m, None where its kind needs none.
+    """An object that lifts a tape off the shell; lengths in m, None where the kind needs none.
 
-    kind  "butt_strap" or "weld" (thickness, width), "step" or "lap" (thickness), "step_over" (over
-          the obstruction, and the shell's arc between the tool's legs), "measured" (excess) or
-          "sag" (span that the tape hangs free over: see `tape_tension.sag_of`)
+    Attributes
+    ----------
+    kind : str
+        "butt_strap" or "weld" (thickness, width), "step" or "lap" (thickness), "step_over" (length
+        over the obstruction, and arc of the shell between the legs of the tool), "measured"
+        (excess) or "sag" (free span, see `tape_tension.sag_of`).
     """
 
     kind: str
@@ -98,10 +101,10 @@ class Obstruction:
     sd_m: float = 0.0
 
     def excess(self, diameter_m):
-        """By how much the tape is longer than the shell's circumference, m; 0 of a free span.
+        """Length of the tape over the obstruction minus the circumference, m; 0 for a free span.
 
-        Of a butt strap or weld cap N (2 t W / D + (8/3) t sqrt(t / D)), of one step half the term
-        of its tangents, of a lap joint that of half its thickness on each side.
+        Butt strap or weld cap: N (2 t W / D + (8/3) t sqrt(t / D)). A step has half the tangent
+        term; a lap joint has half its thickness on each side.
         """
         if self.kind == "sag":
             return 0.0
@@ -114,31 +117,32 @@ class Obstruction:
             return self.count * 4 / 3 * t * np.sqrt(t / (2 * diameter_m))
         if self.kind == "step":
             return self.count * 4 / 3 * t * np.sqrt(t / diameter_m)
+        # The tape covers the width W at radius increased by t, and leaves the shell on both sides.
         along = 2 * t * self.width_m / diameter_m
         return self.count * (along + 8 / 3 * t * np.sqrt(t / diameter_m))
 
 
 @dataclass(frozen=True)
 class Strap:
-    """A reading of a tape round the tank, outside.
+    """A reading of a tape round the outside of a tank.
 
     Attributes
     ----------
     name, course : str
-        Readings of one name are repeats of one circumference.
+        Readings of equal name repeat the same circumference.
     level_m : float
-        From the table's zero, m.
+        Height above the zero of the table, m.
     reading_m, sd_m : float
     tape : str
         Name of a `Tape`.
     temperature_c, tension_n : float or None
-        None: that of the shell; that of the certificate.
+        None: temperature of the shell; tension of the certificate.
     pulls : int
-        In which the tape was pulled round the tank.
+        Number of pulls round the tank.
     check : bool
-        Only compared.
+        True: compared only.
     row : int or None
-        In its file.
+        Row of the file.
     """
 
     name: str
@@ -156,7 +160,7 @@ class Strap:
 
 @dataclass(frozen=True)
 class Strapping:
-    """What was strapped, and with what.
+    """Strapping of a tank.
 
     Attributes
     ----------
@@ -167,12 +171,12 @@ class Strapping:
     comparisons : tuple of Comparison
         Of the working tape with its master.
     shape_sd_m : float
-        Standard deviation of the radius round the wall.
+        Standard deviation of the radius along the circumference.
     wave_m, helix_m : float or None
-        Bounds of how far the tape was out of level, and of what its ends stood apart in height;
-        None: nobody says.
+        Bounds of the deviation of the tape from level, and of the height difference of its ends;
+        None: not declared.
     plate_sd_m : dict
-        {course: standard uncertainty of its plate by the readings of a gauge}.
+        {course: standard uncertainty of its plate thickness from gauge readings}.
     """
 
     straps: tuple[Strap, ...]
@@ -187,10 +191,16 @@ class Strapping:
 
 @dataclass(frozen=True)
 class Effect:
-    """What one standard uncertainty of a cause does to a circumference.
+    """Effect of one standard uncertainty of a cause on a circumference.
 
-    kind, name  of the cause: two readings share it where both are the same
-    u, unit     of it, as it is told; by_m: what it does, m
+    Attributes
+    ----------
+    kind, name : str
+        Identify the cause; readings share a cause if both are equal.
+    u, unit
+        Standard uncertainty of the cause as reported.
+    by_m : float
+        Change of the circumference, m.
     """
 
     kind: str
@@ -209,13 +219,13 @@ class Reduced:
     strap : Strap
     circumference_m : float
     steps_m : dict
-        {correction: what it adds}, in their order: "certificate", "temperature", "tension",
+        {correction: amount added, m}, in the order "certificate", "temperature", "tension",
         "tape_thickness", "rise", "sag", "out_of_level".
     sd_m : float
-        Of what no other reading shares.
+        Standard deviation independent of all other readings.
     effects : tuple of Effect
     by_shell_temperature_m : float
-        m per K, where the tape has the temperature of the shell.
+        Derivative by the shell temperature, m/K, where the tape has the temperature of the shell.
     """
 
     strap: Strap
@@ -227,24 +237,29 @@ class Reduced:
 
 
 def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diameter_m):
-    """`Reduced` circumference of one reading.
+    """Reduce one reading to the circumference of the shell.
 
     Parameters
     ----------
     strap : Strap
     tape : Tape
-        After `certified`: its scale is its own, or its master's.
+        Result of `certified`.
     obstructions : iterable of Obstruction
-        On its way.
+        Obstructions along the tape.
     shell_temperature_c : float or None
     strapping : Strapping
-        For the bounds of how level the tape was.
+        Supplies the bounds of the level of the tape.
     diameter_m : float
-        Of the tank, for the excess of what keeps the tape off.
+        Diameter of the tank, for the excess of the obstructions.
+
+    Returns
+    -------
+    Reduced
     """
-    given = strap.reading_m
-    length = (given + tape.correction_m) * (1 + tape.correction)
-    steps = {"certificate": length - given}
+    observed_m = strap.reading_m
+    # The corrections act on the length in turn, in the order of the heading.
+    length = (observed_m + tape.correction_m) * (1 + tape.correction)
+    steps = {"certificate": length - observed_m}
     on_shell = strap.temperature_c is None
     temperature = shell_temperature_c if on_shell else strap.temperature_c
     warmer = 0.0
@@ -255,15 +270,18 @@ def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diam
     strain, by_tension, by_friction = strain_of(strap, tape)
     steps["tension"] = length * strain
     length += steps["tension"]
+    # The certificate refers to the middle of the tape, which lies d / 2 outside the shell: pi d.
     steps["tape_thickness"] = -np.pi * tape.thickness_m
     obstructions = tuple(obstructions)
-    steps["rise"] = -sum(one.excess(diameter_m) for one in obstructions)
+    steps["rise"] = -sum(item.excess(diameter_m) for item in obstructions)
     sag = sag_of(strap, tape, obstructions)
     steps["sag"] = 0.0 - sag.excess_m
     unlevel = _out_of_level(strapping, diameter_m)
     steps["out_of_level"] = -unlevel
+    # A tape at shell temperature shares the uncertainty of that temperature.
     per_k = length * tape.expansion_per_k if tape.temperature_c is not None else 0.0
     scale = tape.master or tape.name
+    # Each assumed bound is the half-width of a rectangular distribution: u = bound / sqrt(3).
     effects = (
         Effect("instrument_scale", scale, 1e6 * tape.u_scale, "ppm", length * tape.u_scale),
         Effect("instrument_offset", tape.name, 1e3 * tape.u_offset_m, "mm", tape.u_offset_m),
@@ -279,33 +297,36 @@ def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diam
         Effect("tape_temperature", tape.name, TAPE_TEMPERATURE_K / RECTANGULAR, "K",
                0.0 if on_shell else per_k * TAPE_TEMPERATURE_K / RECTANGULAR),
     )  # fmt: skip
-    own = strap.sd_m**2 + strap.pulls * tape.laying_m**2
-    own += sum((one.count * one.sd_m) ** 2 for one in obstructions)
+    # Each pull is laid anew, so the variances of laying add.
+    # Each pull is laid anew, so the variances of laying add.
+    variance = strap.sd_m**2 + strap.pulls * tape.laying_m**2
+    variance += sum((item.count * item.sd_m) ** 2 for item in obstructions)
     return Reduced(
         strap,
-        given + sum(steps.values()),
+        observed_m + sum(steps.values()),
         steps,
-        float(np.sqrt(own)),
-        tuple(one for one in effects if one.by_m),
+        float(np.sqrt(variance)),
+        tuple(item for item in effects if item.by_m),
         per_k if on_shell else 0.0,
     )
 
 
 def _out_of_level(strapping, diameter_m):
-    """Half the bounds of the excess of a tape that is not level: it is never below zero.
+    """Half the bound of the excess of a tape out of level, m: the excess lies between 0 and the
+    bound.
 
-    A tilted plane of amplitude a makes a tape longer by pi a^2 / D, a helix of height h by
-    h^2 / (2 C).
+    A plane tilted with amplitude a lengthens a tape by pi a^2 / D, a helix of height h by h^2 / (2
+    C).
     """
     wave, helix = strapping.wave_m or 0.0, strapping.helix_m or 0.0
     return (np.pi * wave**2 / diameter_m + helix**2 / (2 * np.pi * diameter_m)) / 2
 
 
 def certified(tape, tapes, comparisons):
-    """The tape with the scale and the offset that its master gives it.
+    """Return the tape with scale and offset from the comparison with its master.
 
-    Both tapes were pulled alike at one time: what the master reads, corrected, over what the
-    working tape read is the working tape's scale; its certificate is not copied.
+    Master and working tape were pulled at the same tension and time. The corrected master reading
+    over the working reading is the scale of the working tape; its own certificate is not used.
 
     Parameters
     ----------
@@ -318,21 +339,24 @@ def certified(tape, tapes, comparisons):
     -------
     tape : Tape
     sd : float
-        Of its scale by the comparison alone.
+        Standard deviation of its scale from the comparison alone.
     """
     if not tape.master:
         return tape, 0.0
     master, many = tapes[tape.master], tuple(comparisons)
-    lengths = np.array([one.working_m for one in many])
-    true = np.array([(one.master_m + master.correction_m) * (1 + master.correction)
-                     for one in many])  # fmt: skip
-    sds = np.array([one.sd_m for one in many])
-    if np.any(sds <= 0):  # nobody says how well: their scatter does
+    lengths = np.array([comparison.working_m for comparison in many])
+    true = np.array([(comparison.master_m + master.correction_m) * (1 + master.correction)
+                     for comparison in many])  # fmt: skip
+    sds = np.array([comparison.sd_m for comparison in many])
+    # Without declared standard deviations, use the scatter of the comparisons; 1 mm for a single
+    # one.
+    if np.any(sds <= 0):
         sds = np.full(len(many), np.std(true - lengths, ddof=1) if len(many) > 1 else 1e-3)
         sds = np.maximum(sds, 1e-6)
     weights = (lengths / sds) ** 2
+    # Weighted mean of the scales; a scale has the standard deviation sd / length.
     scale = float(np.sum(weights * (true / lengths - 1)) / np.sum(weights))
-    found = replace(
+    calibrated = replace(
         tape,
         correction=scale,
         correction_m=0.0,
@@ -341,27 +365,31 @@ def certified(tape, tapes, comparisons):
         temperature_c=master.temperature_c,
         tension_n=master.tension_n,
     )
-    return found, float(1 / np.sqrt(np.sum(weights)))
+    return calibrated, float(1 / np.sqrt(np.sum(weights)))
 
 
 def tapes_used(strapping):
-    """Each `Tape` that was read, `certified`, and the sd of its scale by the comparison."""
-    tapes = {one.name: one for one in strapping.tapes}
+    """Each `Tape` used for a reading, `certified`, with the sd of its scale from the comparison."""
+    tapes = {item.name: item for item in strapping.tapes}
     read = dict.fromkeys(strap.tape for strap in strapping.straps)
     return tuple(certified(tapes[name], tapes, strapping.comparisons) for name in read)
 
 
 def reduce_straps(strapping, shell_temperature_c, diameter_m):
-    """`Reduced` of every reading, those that are only compared too.
+    """Reduce all readings, including those compared only.
 
     Parameters
     ----------
     strapping : Strapping
     shell_temperature_c : float or None
     diameter_m : float
+
+    Returns
+    -------
+    tuple of Reduced
     """
     tapes = {tape.name: (tape, sd) for tape, sd in tapes_used(strapping)}
-    found = []
+    results = []
     for strap in strapping.straps:
         tape, sd = tapes[strap.tape]
         obstructions = strapping.obstructions.get(strap.name, ())
@@ -369,8 +397,8 @@ def reduce_straps(strapping, shell_temperature_c, diameter_m):
             strap, tape, obstructions, shell_temperature_c, strapping, diameter_m
         )
         if sd:
-            by = sd * reduced.circumference_m
-            compared = Effect("tape_comparison", tape.name, 1e6 * sd, "ppm", by)
+            effect_m = sd * reduced.circumference_m
+            compared = Effect("tape_comparison", tape.name, 1e6 * sd, "ppm", effect_m)
             reduced = replace(reduced, effects=(*reduced.effects, compared))
-        found.append(reduced)
-    return tuple(found)
+        results.append(reduced)
+    return tuple(results)

@@ -1,4 +1,4 @@
-"""From adjusted targets to points of the wall, with their full covariance."""
+"""Conversion of adjusted targets to points of the wall, with their full covariance."""
 
 import numpy as np
 
@@ -8,54 +8,59 @@ from tankcal.messages import message
 from tankcal.survey.points import Points
 from tankcal.survey.results import Cause
 
-LARGEST = 2500  # points whose full covariance is kept: 7500 x 7500 numbers, 450 MB
+LARGEST = 2500  # points with a full covariance: 7500 x 7500 numbers, 450 MB
 
 
 def wall_points(adjustment, measurements, side):
-    """The Points of the wall: adjusted targets less their offsets, covariance, causes.
+    """Convert adjusted targets to points of the wall.
 
         wall = target - (+ inside) offset * horizontal normal of the wall, outwards
 
-    With targets.csv these are the points that it names, else all but the stations of set-ups.
+    With targets.csv the points listed there are used, otherwise all points except stations.
 
     Parameters
     ----------
-    adjustment
-        Adjustment.
-    measurements
-        job.Measurements that it is of.
-    side
-        "outside" or "inside": where the observer stood.
+    adjustment : Adjustment
+    measurements : Measurements
+        Measurements of the adjustment.
+    side : str
+        "outside" or "inside": position of the observer.
+
+    Returns
+    -------
+    Points
+        With covariance and causes.
 
     Raises
     ------
     SolutionError
-        When too many points, or none, are left.
+        If no point or too many points remain.
     """
     targets = measurements.targets
     place = {name: i for i, name in enumerate(adjustment.names)}
     if targets is not None:
         rows = {name: i for i, name in enumerate(targets.point) if name in place}
     else:
-        stations = {one.station for one in measurements.setups}
+        stations = {cause.station for cause in measurements.setups}
         rows = dict.fromkeys((name for name in place if name not in stations), None)
     names = tuple(rows)
     _refuse_size(len(names))
-    chosen = np.array([place[name] for name in names])
-    xyz = adjustment.xyz_m[chosen]
+    indices = np.array([place[name] for name in names])
+    xyz = adjustment.xyz_m[indices]
     section = generatrix = numbers = (None,) * len(names)
     if targets is not None:
-        of = list(rows.values())
-        section = tuple(targets.section[i] for i in of)
-        generatrix = tuple(targets.generatrix[i] for i in of)
-        numbers = tuple(targets.rows[i] for i in of) if targets.rows else numbers
-        offset = np.nan_to_num(np.asarray(targets.offset_m, dtype=float)[of])
+        target_rows = list(rows.values())
+        section = tuple(targets.section[i] for i in target_rows)
+        generatrix = tuple(targets.generatrix[i] for i in target_rows)
+        numbers = tuple(targets.rows[i] for i in target_rows) if targets.rows else numbers
+        offset = np.nan_to_num(np.asarray(targets.offset_m, dtype=float)[target_rows])
+        # Seen from inside, the target is on the inner side of the wall: the offset changes sign.
         xyz = move_to_wall(xyz, offset if side == "outside" else -offset)
     covariance = adjustment.full_covariance_m2(names)
-    coordinates = (3 * chosen[:, None] + np.arange(3)).ravel()
+    coordinates = (3 * indices[:, None] + np.arange(3)).ravel()
     causes = tuple(
-        Cause(one.name, one.what, one.u, one.unit, one.column_m[coordinates])
-        for one in adjustment.causes
+        Cause(cause.name, cause.what, cause.u, cause.unit, cause.column_m[coordinates])
+        for cause in adjustment.causes
     )
     return Points(
         names=names, xyz_m=xyz, sd_m=None, covariance_m2=covariance, section=section,
@@ -64,11 +69,26 @@ def wall_points(adjustment, measurements, side):
 
 
 def move_to_wall(xyz_m, outwards_m):
-    """Points (n, 3) moved by -outwards_m (n,) along the horizontal normal, away from the axis.
+    """Move points by -outwards_m along the horizontal normal, away from the axis.
 
-    The axis is that of the circle through all points in plan (Taubin 1991). It may stand a few
-    centimetres off without changing the result: 0.1 m of 6.5 m turn a normal by 15 mrad, an offset
-    of 10 mm then errs by 1 um.
+    The axis is that of the circle through all points in plan (Taubin 1991). An error of a few
+    centimetres in the axis is harmless: 0.1 m at a radius of 6.5 m turns a normal by 15 mrad, which
+    changes an offset of 10 mm by 1 um.
+
+    Parameters
+    ----------
+    xyz_m : ndarray, shape (n, 3)
+    outwards_m : ndarray, shape (n,)
+        Offset of each target from the wall.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+
+    Raises
+    ------
+    SolutionError
+        If offsets are given for fewer than 3 points.
     """
     if not np.any(outwards_m):
         return xyz_m
@@ -80,6 +100,7 @@ def move_to_wall(xyz_m, outwards_m):
                 count=len(xyz_m),
             )
         )
+    # Centring limits rounding in the circle fit.
     middle = xyz_m[:, :2].mean(axis=0)
     x, y, _ = taubin_circle(xyz_m[:, :2] - middle)
     away = xyz_m[:, :2] - middle - [x, y]
@@ -90,6 +111,7 @@ def move_to_wall(xyz_m, outwards_m):
 
 
 def _refuse_size(n):
+    """Raise SolutionError if a wall has no point, or too many for a full covariance."""
     if not n:
         raise SolutionError(
             message(

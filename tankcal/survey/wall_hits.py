@@ -1,6 +1,6 @@
-"""Bare hits of a wall by a total station, as they were read: no target, no name.
+"""Wall hits of a total station as read, without targets or names.
 
-Angles are radians, lengths metres; nothing has been corrected or left out.
+Angles are in radians, lengths in metres; values are neither corrected nor omitted.
 """
 
 from dataclasses import dataclass, field
@@ -19,11 +19,11 @@ class RangingInstrument:
         True distance = (reading + correction_m) (1 + correction).
     correction_m : float
     u_scale : float
-        Standard uncertainty of the scale, relative.
+        Relative standard uncertainty of the scale.
     u_offset_m : float
-        Of the offset, m; nan: not known, something else must tell it.
+        Standard uncertainty of the offset, m; nan: unknown, to be estimated from the wall.
     u_incidence_m : float
-        Of the bias at 60 degrees of incidence, m.
+        Standard uncertainty of the bias at 60 degrees of incidence, m.
     certificate : str
     """
 
@@ -38,14 +38,14 @@ class RangingInstrument:
 
 @dataclass(frozen=True)
 class ControlReading:
-    """A control target as a set-up read it at some time; nan: this was not read.
+    """A reading of a control target from a set-up; nan: not read.
 
     Attributes
     ----------
     setup, target : str
     direction_rad, zenith_rad, distance_m : float
     time_s : float
-        Since some common moment.
+        Time since a common origin, s.
     row : int or None
     """
 
@@ -60,29 +60,29 @@ class ControlReading:
 
 @dataclass(frozen=True)
 class WallHits:
-    """Hits of a wall, in the order of their file, and what took them; n hits.
+    """n hits of a wall, in the order of their file, with their instruments.
 
     Attributes
     ----------
     setup : tuple of str, length n
     set : tuple of str or None, length n
-        Of directions within the set-up, with a zero of its own.
+        Set of directions within the set-up, with its own circle zero.
     course : tuple of str or None, length n
-        As the crew has it.
+        Course recorded in the field.
     direction_rad, zenith_rad, distance_m : ndarray, shape (n,)
         As read.
     sd_m, sd_rad : ndarray, shape (n,)
-        Of a distance, and of either angle.
+        Standard deviations of the distance, and of each angle.
     surface : tuple of str, length n
         "paint", "rust", "tape" or "".
     check : ndarray of bool, shape (n,)
-        Only compared.
+        True: compared only.
     setups : dict
         {name: measurements.Setup}, each with its instrument.
     instruments : dict
         {name: RangingInstrument}.
     stations : dict
-        {station: (3,) coordinates, nan: not known}, as control.csv has them.
+        {station: (3,) coordinates from control.csv, m; nan: unknown}.
     control : tuple of ControlReading
     rows : tuple of int
     file : str
@@ -110,5 +110,5 @@ class WallHits:
 
     @property
     def instrument(self):
-        """(n,) name of the instrument of each hit."""
+        """Names (n,) of the instruments of the hits."""
         return tuple(self.setups[name].instrument for name in self.setup)

@@ -1,1 +1,1 @@
-"""What does not fit, and why: gross errors, held control, misread files."""
+"""Diagnosis of a survey that does not fit: gross errors, held control, misread files."""

@@ -1,8 +1,8 @@
-"""Blunders: gross ones seen before the adjustment, others set aside by the search.
+"""Blunders: gross errors detected before the adjustment, other blunders by data snooping.
 
-A distance in millimetres or a station's angles in gon would drive the iteration away. Readings that
-are far from what the start values say begin set aside; the search for blunders takes them back when
-they agree after all. Points that lost their readings to the search are given another chance.
+A distance in millimetres or a station's angles in gon would make the iteration diverge. Readings
+far from the start values are therefore rejected first, and data snooping readmits those that agree.
+Points that lost their readings to the search are tried once more.
 """
 
 import itertools
@@ -26,9 +26,16 @@ from tankcal.survey.start.resection import bearings, intersect_rays
 class Searched:
     """An adjusted survey after the search for blunders.
 
-    adjusted  network.Adjusted       removed   tuple of network.snooping.Removed
-    rounds    adjustments            needed    tuple of network.snooping.Removed that were kept
-    warnings  tuple of Problem
+    Attributes
+    ----------
+    adjusted : network.Adjusted
+    removed : tuple of network.snooping.Removed
+        Rejected observations.
+    rounds : int
+        Number of adjustments.
+    needed : tuple of network.snooping.Removed
+        Suspected observations that were kept because unknowns depend on them.
+    warnings : tuple of Problem
     """
 
     adjusted: object
@@ -39,14 +46,26 @@ class Searched:
 
 
 def search_blunders(survey, options, gross=None):
-    """The Searched of a survey; when the search finds no end, everything is adjusted and told.
+    """Search a survey for blunders.
 
-    gross  {source: (n,) True} readings that begin set aside, or None: no search at all
+    If the search does not converge, all observations are adjusted and a warning is added.
+
+    Parameters
+    ----------
+    survey : network.Survey
+    options : dict
+        Keyword arguments of network.adjust.
+    gross : dict, optional
+        {source: (n,) True} readings rejected at the start; None: no search.
+
+    Returns
+    -------
+    Searched
     """
     if gross is None:
         return Searched(adjust(survey, **options), (), 1)
     try:
-        found = _without(survey, options, gross) if gross else snoop(survey, **options)
+        cleaned = _without(survey, options, gross) if gross else snoop(survey, **options)
     except SolutionError as error:
         adjusted = adjust(survey, **options)
         text = message(
@@ -58,31 +77,46 @@ def search_blunders(survey, options, gross=None):
         return Searched(
             adjusted, (), 1, (), (Problem("job.toml", text, None, "adjustment.snooping"),)
         )
-    again = _readmitted(found, gross)
+    again = _readmitted(cleaned, gross)
     if again is not None:
         try:
+            # The start values are good now, so a robust start is not needed.
             second = snoop(again, robust=False, **options)
         except SolutionError:
-            second = found
-        if second.adjusted.problem.aside.sum() < found.adjusted.problem.aside.sum():
-            rounds = found.rounds + second.rounds
+            second = cleaned
+        # Accept the second search only if it recovers points.
+        if second.adjusted.problem.aside.sum() < cleaned.adjusted.problem.aside.sum():
+            rounds = cleaned.rounds + second.rounds
             return Searched(second.adjusted, second.removed, rounds, second.needed)
-    return Searched(found.adjusted, found.removed, found.rounds, found.needed)
+    return Searched(cleaned.adjusted, cleaned.removed, cleaned.rounds, cleaned.needed)
 
 
 def _counted_anew(block, gross):
-    """A Block after readings were taken out of the tables; none of its own is among them."""
+    """Renumber the rows of a Block after readings outside the block left the tables."""
     row = block.row.copy()
-    for source, gone in gross.items():
-        mine = block.source == source
-        row[mine] -= np.cumsum(gone)[row[mine]]
+    for source, removed in gross.items():
+        is_of_source = block.source == source
+        # Each row moves up by the number of removed rows before it.
+        row[is_of_source] -= np.cumsum(removed)[row[is_of_source]]
     return replace(block, row=row)
 
 
 def _without(survey, options, gross):
-    """network.Cleaned of a survey: first without some readings, then with these set aside."""
+    """Search a survey twice: first without some readings, then with these readings rejected.
+
+    Parameters
+    ----------
+    survey : network.Survey
+    options : dict
+    gross : dict
+        {source: (n,) True} readings to leave out.
+
+    Returns
+    -------
+    network.Cleaned
+    """
     images = survey.image_points
-    thin = replace(  # without their traces: the scatter of repeated readings does not count here
+    thin = replace(  # without traces: the scatter of repeated readings does not count here
         survey,
         image_points=None if images is None else replace(images, trace=None),
         observations=tuple(
@@ -100,105 +134,124 @@ def _without(survey, options, gross):
     images = first.survey.image_points
     if images is not None and images.use is not None:
         uses["image points"] = images.use
-    whole = snoop(
+    # Start from the first solution, in which the readings left out are tested as rejected ones.
+    cleaned = snoop(
         set_use(start_from_adjusted(survey, first.adjusted), uses), robust=False, **options
     )
-    return replace(whole, rounds=first.rounds + whole.rounds)
+    return replace(cleaned, rounds=first.rounds + cleaned.rounds)
 
 
-def _readmitted(found, gross):
-    """The survey with all readings of points that the search left with too few; None: no such."""
-    lost = found.adjusted.problem.aside
-    if not lost.any():
+def _readmitted(cleaned, gross):
+    """Restore all readings of points that lost too many to the search; None: no such point."""
+    lost_points = cleaned.adjusted.problem.aside
+    if not lost_points.any():
         return None
-    survey, uses = found.survey, {}
+    survey, uses = cleaned.survey, {}
     images = survey.image_points
     if images is not None and images.use is not None:
-        uses["image points"] = np.where(lost[images.point], 1.0, images.use)
-    for number, one in enumerate(survey.observations):
-        if one.use is not None and one.ties:
-            back = np.any([lost[getattr(one, name)] for name in one.ties], axis=0)
-            back &= ~gross.get(number, np.zeros(len(one), dtype=bool))
-            uses[number] = np.where(back, 1.0, one.use)
+        uses["image points"] = np.where(lost_points[images.point], 1.0, images.use)
+    for number, table in enumerate(survey.observations):
+        if table.use is not None and table.ties:
+            back = np.any([lost_points[getattr(table, name)] for name in table.ties], axis=0)
+            # Grossly wrong readings stay out.
+            back &= ~gross.get(number, np.zeros(len(table), dtype=bool))
+            uses[number] = np.where(back, 1.0, table.use)
     return set_use(survey, uses)
 
 
-FAR = 0.25  # relative, of a distance
-ASKEW_RAD = 0.1  # of an angle
-AS_OTHERS = 10.0  # times the median misclosure of all readings of a kind
-MOST = 0.4  # share of a kind beyond which the start values are wrong, not the readings
-WORSE = 10.0  # times the median photo's misclosure, above which a photo is looked at
-WORST_MM = 0.2
-START_M = 0.1  # sd of a place before the adjustment
+FAR = 0.25  # relative error of a gross distance
+ASKEW_RAD = 0.1  # error of a gross angle
+AS_OTHERS = 10.0  # ratio to the median misclosure of the kind, below which a reading is not gross
+MOST = 0.4  # share of a kind above which the start values are wrong, not the readings
+WORSE = 10.0  # ratio to the median misclosure of photos, above which a photo is examined
+WORST_MM = 0.2  # smallest misclosure of an examined photo
+START_M = 0.1  # standard deviation of a position before the adjustment
 
 
 def gross_readings(survey):
-    """{source: (n,) True} for readings that are grossly off the start values of a survey.
+    """Find readings far from the start values.
 
-    Raises SolutionError for photos that are mirrored.
+    Parameters
+    ----------
+    survey : network.Survey
+
+    Returns
+    -------
+    dict
+        {source: (n,) True for gross readings}.
+
+    Raises
+    ------
+    SolutionError
+        If photos are mirrored.
     """
-    problem, found = assemble(survey), {}
-    for one, source, rows in zip(
+    problem, gross_rows = assemble(survey), {}
+    for group, source, rows in zip(
         problem.observations, problem.sources, problem.rows_of, strict=True
     ):
-        if source in ("known beforehand", CORRELATED) or not len(one):
+        if source in ("known beforehand", CORRELATED) or not len(group):
             continue
-        w = np.empty((len(one), one.rows))
-        one.fill(problem.state, w, np.empty((0, one.rows, 0)))
-        off = w / one.weight
+        w = np.empty((len(group), group.rows))
+        group.fill(problem.state, w, np.empty((0, group.rows, 0)))
+        off = w / group.weight
         if source == "image points":
             _refuse_mirrored(survey, np.linalg.norm(off, axis=1), rows)
             continue
-        off = _about_their_sets(one, off) if isinstance(one, Directions) else np.abs(off)
-        limit = np.maximum(_limit(one, problem.state), AS_OTHERS * np.median(off[:, 0]))
+        off = _about_their_sets(group, off) if isinstance(group, Directions) else np.abs(off)
+        # All readings of a kind may be off because the start values are poor.
+        limit = np.maximum(_limit(group, problem.state), AS_OTHERS * np.median(off[:, 0]))
         gross = off[:, 0] > limit
         if gross.any() and gross.mean() < MOST:
-            found[source] = np.zeros(len(survey.observations[source]), dtype=bool)
-            found[source][rows[gross]] = True
-            found[source] &= ~kept_of(survey.observations[source], survey.kept)
-    return found
+            gross_rows[source] = np.zeros(len(survey.observations[source]), dtype=bool)
+            gross_rows[source][rows[gross]] = True
+            gross_rows[source] &= ~kept_of(survey.observations[source], survey.kept)
+    return gross_rows
 
 
 def swapped_at_start(survey, known):
     """Problem rows for fixed control points whose rays meet where x and y are exchanged.
 
-    Weighted ones are left to the adjustment, which can set them aside.
+    Weighted points are left to the adjustment, which can reject them.
     """
     sights, points = sights_of(survey), len(survey.points)
     if not sights:
         return []
     owner = np.concatenate([sight.point for sight in sights])
     photo = np.repeat(np.arange(len(sights)), [len(sight.point) for sight in sights])
-    ours = np.isfinite(known.xyz_m).all(axis=1)[owner]
-    rays = bearings(np.vstack([sight.ideal for sight in sights])[ours])
-    rays = np.einsum("nji,nj->ni", survey.photos.rotation[photo[ours]], rays)
-    met, _ = intersect_rays(survey.photos.xyz_m[photo[ours]], rays, owner[ours], points)
+    is_control = np.isfinite(known.xyz_m).all(axis=1)[owner]
+    rays = bearings(np.vstack([sight.ideal for sight in sights])[is_control])
+    # Rotate the rays to the frame of the survey and intersect those of each point.
+    rays = np.einsum("nji,nj->ni", survey.photos.rotation[photo[is_control]], rays)
+    intersections, _ = intersect_rays(
+        survey.photos.xyz_m[photo[is_control]], rays, owner[is_control], points
+    )
     held = (known.sd_m[:, :2] == 0).all(axis=1)
     number = {name: i for i, name in enumerate(survey.points)}
     row = {name: row for name, row in known.row.items() if held[number[name]]}
-    return find_swapped_points(survey.points, met, replace(known, row=row), START_M)
+    return find_swapped_points(survey.points, intersections, replace(known, row=row), START_M)
 
 
-def _limit(one, state):
-    """(n,) or number: what a misclosure must exceed to be gross."""
-    if isinstance(one, Distances):
-        return FAR * one.computed(state, False)[0][:, 0]
-    return ASKEW_RAD if one.unit == "rad" else np.inf
+def _limit(observations, state):
+    """Smallest gross misclosure, a number or (n,)."""
+    if isinstance(observations, Distances):
+        return FAR * observations.computed(state, False)[0][:, 0]
+    return ASKEW_RAD if observations.unit == "rad" else np.inf
 
 
-def _about_their_sets(one, misclosure):
-    """Misclosures (n, 1) of directions, about the median of each set."""
+def _about_their_sets(directions, misclosure):
+    """Misclosures (n, 1) of directions relative to the median of their set."""
     off = np.zeros_like(misclosure)
-    for number in np.unique(one.set):
-        mine = one.set == number
-        turned = np.exp(1j * misclosure[mine])
+    for number in np.unique(directions.set):
+        is_of_set = directions.set == number
+        turned = np.exp(1j * misclosure[is_of_set])
+        # The orientation of the set is still unknown: its median misclosure removes it.
         middle = np.angle(np.median(turned.real) + 1j * np.median(turned.imag))
-        off[mine] = np.abs(np.angle(turned * np.exp(-1j * middle)))
+        off[is_of_set] = np.abs(np.angle(turned * np.exp(-1j * middle)))
     return off
 
 
 def _refuse_mirrored(survey, off_mm, rows):
-    """Raise when photos fit far worse than others, and well once they are mirrored."""
+    """Raise SolutionError if photos fit far worse than others, and well after mirroring."""
     images = survey.image_points
     photo, n = images.photo[rows], len(survey.photos.names)
     order = np.argsort(photo, kind="stable")
@@ -210,13 +263,14 @@ def _refuse_mirrored(survey, off_mm, rows):
         ]
     )
     doubtful = np.flatnonzero(error > max(WORSE * np.median(error), WORST_MM))
+    # If many photos misfit, the start values are wrong.
     if not len(doubtful) or len(doubtful) > MOST * n:
         return
     sights = sights_of(replace(survey, image_points=replace(images, use=None)))
-    found = [
+    mirrored = [
         mirrored_photo(survey.photos.names[i])
         for i in doubtful
         if mirrored_fits(survey.xyz_m[sights[i].point], sights[i].ideal)
     ]
-    if found:
-        raise SolutionError("\n".join(map(str, found)))
+    if mirrored:
+        raise SolutionError("\n".join(map(str, mirrored)))

@@ -1,4 +1,4 @@
-"""What was kept apart and is only compared: check readings, check points, control not acting."""
+"""Comparison of check readings, check points and unused control with the adjustment."""
 
 from dataclasses import replace
 
@@ -10,33 +10,57 @@ from tankcal.survey.network.quality import compare_left_out
 from tankcal.survey.observations import ImageCoordinates
 from tankcal.survey.results import CheckPoints, Reading
 
-DISAGREE = 4.0  # sds by which a check point may differ
-LISTED = 10  # check points that are told
+DISAGREE = 4.0  # standard deviations by which a check point may differ
+LISTED = 10  # check points listed in warnings
 
 
 def check_readings(adjusted, checks, cov_scale):
-    """Reading rows (check=True) of observations that were left out of the adjustment.
+    """Reading rows (check=True) of observations left out of the adjustment.
 
-    checks  Observations
+    Parameters
+    ----------
+    adjusted : network.Adjusted
+    checks : iterable of Observations
+    cov_scale : float
+        Variance factor of the covariances.
+
+    Returns
+    -------
+    list of Reading
     """
-    found = []
-    for one in checks:
-        parts = _by_form(adjusted, one) if isinstance(one, ImageCoordinates) else [one]
+    readings = []
+    for observations in checks:
+        parts = (
+            _split_by_form(adjusted, observations)
+            if isinstance(observations, ImageCoordinates)
+            else [observations]
+        )
         for part in parts:
-            found += _rows(adjusted, part, cov_scale)
-    return found
+            readings += _rows(adjusted, part, cov_scale)
+    return readings
 
 
-def find_disagreeing_checks(found, table):
+def find_disagreeing_checks(check_points, table):
     """Problem rows of check points that differ more than their uncertainty allows.
 
-    found  CheckPoints or None        table  job.KnownPoints of check.csv, or None
+    Parameters
+    ----------
+    found : CheckPoints or None
+    table : KnownPoints or None
+        Contents of check.csv.
+
+    Returns
+    -------
+    list of Problem
     """
     problems = []
-    if found is None or table is None:
+    if check_points is None or table is None:
         return problems
-    for name, difference, sd in zip(found.names, found.difference_m, found.sd_m, strict=True):
+    for name, difference, sd in zip(
+        check_points.names, check_points.difference_m, check_points.sd_m, strict=True
+    ):
         with np.errstate(divide="ignore", invalid="ignore"):
+            # An sd of 0 gives no test.
             away = np.nan_to_num(np.abs(difference) / sd, posinf=0.0)
         if name in table.point and away.max() > DISAGREE:
             k = int(away.argmax())
@@ -55,30 +79,32 @@ def find_disagreeing_checks(found, table):
     return problems[:LISTED]
 
 
-def _rows(adjusted, one, cov_scale):
-    ties = [np.asarray(getattr(one, name)) for name in one.ties]
-    there = np.isfinite(adjusted.xyz_m[np.array(ties)]).all(axis=(0, 2))
-    one = one.taken(there)
-    if not len(one):
+def _rows(adjusted, observations, cov_scale):
+    """Reading rows of one table, without observations of points that are not adjusted."""
+    ties = [np.asarray(getattr(observations, name)) for name in observations.ties]
+    is_adjusted = np.isfinite(adjusted.xyz_m[np.array(ties)]).all(axis=(0, 2))
+    observations = observations.taken(is_adjusted)
+    if not len(observations):
         return []
-    result = compare_left_out(adjusted, one)
-    sd = np.reshape(one.sd, result.difference.shape)
+    result = compare_left_out(adjusted, observations)
+    sd = np.reshape(observations.sd, result.difference.shape)
+    # The variance factor applies to the adjusted part; the variance of the reading keeps its scale.
     spread = np.sqrt(sd**2 + cov_scale * np.maximum(result.sd**2 - sd**2, 0.0))
-    value = np.reshape(one.value, sd.shape)
-    trace, nan = one.trace, float("nan")
+    value = np.reshape(observations.value, sd.shape)
+    trace, nan = observations.trace, float("nan")
     return [
         Reading(
-            one.kind, trace.ids[i], name, trace.file, trace.rows[i], 1, one.unit,
+            observations.kind, trace.ids[i], name, trace.file, trace.rows[i], 1, observations.unit,
             float(value[i, k]), float(result.difference[i, k]), float(sd[i, k]), 1.0,
             float(result.difference[i, k] / spread[i, k]), nan, nan, nan, False, True,
         )
-        for i in range(len(one))
+        for i in range(len(observations))
         for k, name in enumerate(trace.element[i])
     ]  # fmt: skip
 
 
-def _by_form(adjusted, images):
-    """ImageCoordinates of each form of camera, as the solver has them."""
+def _split_by_form(adjusted, images):
+    """Yield the ImageCoordinates of each form of camera, as the solver requires."""
     table, spare = adjusted.problem.interior_of, adjusted.problem.layout.interior.size - 1
     active = np.flatnonzero((table < spare).any(axis=0))
     for form, rows in adjusted.survey.by_form(images):
@@ -86,19 +112,32 @@ def _by_form(adjusted, images):
 
 
 def check_points(adjusted, measurements, known, acting, cov_scale):
-    """CheckPoints of check.csv, check rows of control.csv, and control that does not act; or None.
+    """Compare check.csv, check rows of control.csv and unused control with the adjustment.
 
-    known   Known                 acting  (points, 3) True: this control coordinate was adjusted
+    Parameters
+    ----------
+    adjusted : network.Adjusted
+    measurements : Measurements
+    known : Known
+    acting : ndarray of bool, shape (points, 3)
+        Control coordinates that were adjusted.
+    cov_scale : float
+        Variance factor of the covariances.
+
+    Returns
+    -------
+    CheckPoints or None
+        None: no check point.
     """
     number = {name: i for i, name in enumerate(adjusted.survey.points)}
-    there = np.isfinite(adjusted.xyz_m).all(axis=1)
+    is_adjusted = np.isfinite(adjusted.xyz_m).all(axis=1)
     rows = {}
     for table in (measurements.check, measurements.control):
         for name, xyz, sd in _check_rows(table, only_checks=table is measurements.control):
-            if name in number and there[number[name]]:
+            if name in number and is_adjusted[number[name]]:
                 rows[name] = xyz, sd
     idle = np.isfinite(known.sd_m) & ~acting
-    for i in np.flatnonzero(idle.any(axis=1) & there):
+    for i in np.flatnonzero(idle.any(axis=1) & is_adjusted):
         xyz = np.where(idle[i], known.xyz_m[i], np.nan)
         rows.setdefault(adjusted.survey.points[i], (xyz, known.sd_m[i]))
     if not rows:
@@ -106,6 +145,7 @@ def check_points(adjusted, measurements, known, acting, cov_scale):
     points = np.array([number[name] for name in rows])
     xyz, sd = (np.array([row[k] for row in rows.values()]) for k in (0, 1))
     difference = adjusted.xyz_m[points] - xyz
+    # Check coordinates are independent of the adjustment, so the variances add.
     variance = cov_scale * np.einsum("nii->ni", adjusted.point_covariances_m2[points])
     size = np.sqrt(np.nansum(difference**2, axis=1))
     return CheckPoints(
@@ -119,7 +159,7 @@ def check_points(adjusted, measurements, known, acting, cov_scale):
 
 
 def _check_rows(table, only_checks):
-    """Names, coordinates and sds of the rows of a table in the survey's own frame."""
+    """Yield name, coordinates and standard deviations of rows in the frame of the survey."""
     if table is None:
         return
     systems = table.system or (None,) * len(table.point)

@@ -1,6 +1,6 @@
-"""What only the adjustment can tell: likely causes of what does not fit, in sentences.
+"""Likely causes of misfits, derived from the adjustment, in sentences.
 
-Each diagnosis is a Problem that is warned of; none of them changes a number.
+Each diagnosis is a warning; no diagnosis changes a number.
 """
 
 from collections import defaultdict
@@ -27,24 +27,34 @@ FACTORS = (
     (10.0, MISPLACED),
     (0.1, MISPLACED),
 )
-CLOSE = 0.003  # relative: how well such a factor must explain a distance
-SWAPPED = 0.05  # what a swap may leave of the plan distance between given and adjusted
+CLOSE = 0.003  # relative accuracy with which a factor must explain a distance
+# largest remaining share of the plan distance between given and adjusted after a swap
+SWAPPED = 0.05
 GON = (
     (0.9, message("gon_as_degrees", "gon read as degrees")),
     (1 / 0.9, message("degrees_as_gon", "degrees read as gon")),
 )
-LEFT = 0.05  # what the factor may leave of the scatter of a station's angles
-TOLD = 10  # diagnoses of one kind that are listed
-TRIMMED = 0.97  # sigma0 that a search for blunders at 0.1 % alone may leave of 1 (it takes 0.6 %)
-LOST = 0.2  # share of a photo's points set aside, above which the photo itself is doubted
-MIRRORED = 0.2  # share of its error that a photo may keep when it is mirrored
+LEFT = 0.05  # largest remaining share of the scatter of a station's angles after the factor
+TOLD = 10  # diagnoses of one kind listed
+TRIMMED = 0.97  # sigma0 to which data snooping at 0.1 % alone may reduce 1 (it removes 0.6 %)
+LOST = 0.2  # share of a photo's points rejected, above which the photo is suspected
+MIRRORED = 0.2  # largest remaining share of the error of a mirrored photo
 
 
 def diagnose(adjusted, readings, groups, known):
-    """Problem rows for everything that is found.
+    """Collect all diagnoses of an adjusted survey.
 
-    adjusted  network.Adjusted            readings  Readings, those set aside among them
-    groups    GroupOfReadings             known     Known control
+    Parameters
+    ----------
+    adjusted : network.Adjusted
+    readings : Readings
+        Including rejected readings.
+    groups : sequence of GroupOfReadings
+    known : Known
+
+    Returns
+    -------
+    list of Problem
     """
     doubtful = list(readings.where(readings.removed | (np.abs(readings.columns["w"]) > CRITICAL)))
     return [
@@ -57,19 +67,22 @@ def diagnose(adjusted, readings, groups, known):
 
 
 def failed_test(adjusted, groups):
-    """Says so when the global test fails, with the groups that are the likely cause."""
+    """Report a failed global test, with the groups that are the likely cause."""
     if adjusted.dof < 1:
         return []
     test = adjusted.test()
+    # A small chi-square is not reported if data snooping alone explains it.
     large = test.chi2 > test.high
     if test.passed or (not large and adjusted.sigma0 > TRIMMED):
         return []
+    # Groups whose factor differs from 1 by three standard deviations in the direction of the
+    # failure.
     off = [
-        one
-        for one in groups
-        if one.redundancy > 1 and (one.factor - 1) * (1 if large else -1) > 3 * one.factor_sd
+        group
+        for group in groups
+        if group.redundancy > 1 and (group.factor - 1) * (1 if large else -1) > 3 * group.factor_sd
     ]
-    off.sort(key=lambda one: -abs(np.log(max(one.factor, 1e-9))))
+    off.sort(key=lambda group: -abs(np.log(max(group.factor, 1e-9))))
     text, cause = _verdict(adjusted.sigma0, test, large), _cause(off[:4], large)
     if cause:
         text = message("test_and_cause", "{test}; {cause}", test=text, cause=cause)
@@ -77,6 +90,7 @@ def failed_test(adjusted, groups):
 
 
 def _verdict(sigma0, test, large):
+    """Sentence with the result of the global test."""
     if large:
         return message(
             "test_above",
@@ -99,8 +113,8 @@ def _verdict(sigma0, test, large):
 
 
 def _cause(off, large):
-    """The groups whose standard deviations explain a failed test; None: nothing to be said."""
-    groups = [_group(one) for one in off]
+    """Groups whose standard deviations explain a failed test; None: no statement."""
+    groups = [_group(group) for group in off]
     if groups and large:
         template = "standard deviations declared too small: {groups}"
         return message("sds_too_small", template, groups=groups)
@@ -116,31 +130,44 @@ def _cause(off, large):
     return None
 
 
-def _group(one):
-    if one.name:
+def _group(readings):
+    """A group with its factor, in words."""
+    if readings.name:
         return message(
             "named_group",
             "{group} {of_group} ({factor:.2g} times)",
-            group=one.kind,
-            of_group=one.name,
-            factor=one.factor,
+            group=readings.kind,
+            of_group=readings.name,
+            factor=readings.factor,
         )
     template = "{group} ({factor:.2g} times)"
-    return message("whole_group", template, group=one.kind, factor=one.factor)
+    return message("whole_group", template, group=readings.kind, factor=readings.factor)
 
 
 def find_swapped_points(names, xyz_m, known, sd_m=0.0):
-    """Problem rows for control points that lie where they were given with x and y exchanged.
+    """Problem rows for control points that fit their coordinates with x and y exchanged.
 
-    names (n,), xyz_m (n, 3) where they are, to sd_m (an addition to that of control)
+    Parameters
+    ----------
+    names : sequence of str, length n
+    xyz_m : ndarray, shape (n, 3)
+        Computed positions.
+    known : Known
+    sd_m : float
+        Standard deviation of the computed positions, added to that of control.
+
+    Returns
+    -------
+    list of Problem
     """
     number = {name: i for i, name in enumerate(names)}
-    found = []
+    problems = []
     for name, row in known.row.items():
-        given, here = known.xyz_m[number[name]], xyz_m[number[name]]
+        control_m, here = known.xyz_m[number[name]], xyz_m[number[name]]
         sd = np.nan_to_num(known.sd_m[number[name]])[:2].max() + sd_m
-        away = np.hypot(*(here - given)[:2])
-        back = np.hypot(here[0] - given[1], here[1] - given[0])
+        away = np.hypot(*(here - control_m)[:2])
+        back = np.hypot(here[0] - control_m[1], here[1] - control_m[0])
+        # Significantly off, and the exchange removes nearly all of the difference.
         if away > max(10 * sd, 1e-3) and back < SWAPPED * away:
             text = message(
                 "point_swapped",
@@ -150,76 +177,84 @@ def find_swapped_points(names, xyz_m, known, sd_m=0.0):
                 away_m=away,
                 back_m=back,
             )
-            found.append(Problem("control.csv", text, row, "x_m"))
-    return found[:TOLD]
+            problems.append(Problem("control.csv", text, row, "x_m"))
+    return problems[:TOLD]
 
 
 def wrong_distances(doubtful):
-    """Distances that a wrong unit or a misplaced decimal point explains."""
-    found = []
-    for one in doubtful:
-        computed = one.value + one.residual
-        if one.kind != "distance" or not computed > 0:
+    """Problem rows for distances explained by a wrong unit or a misplaced decimal point."""
+    problems = []
+    for reading in doubtful:
+        computed = reading.value + reading.residual
+        if reading.kind != "distance" or not computed > 0:
             continue
         for factor, what in FACTORS:
-            if abs(one.value / computed / factor - 1) < CLOSE:
+            if abs(reading.value / computed / factor - 1) < CLOSE:
                 text = message(
                     "wrong_distance",
                     "distance {distance} is {value_m:.4f} m where {computed_m:.4f} m was expected:"
                     " it looks like {what}",
-                    distance="-".join(one.ids),
-                    value_m=one.value,
+                    distance="-".join(reading.ids),
+                    value_m=reading.value,
                     computed_m=computed,
                     what=what,
                 )
-                found.append(Problem(one.file, text, one.row))
+                problems.append(Problem(reading.file, text, reading.row))
                 break
-    return found[:TOLD]
+    return problems[:TOLD]
 
 
 def wrong_angles(readings, doubtful):
-    """Stations whose angles in one file fit once gon and degrees are exchanged."""
-    stations = {(one.file, one.ids[0]) for one in doubtful if one.unit == "rad" and one.row}
+    """Problem rows for stations whose angles in one file fit after exchanging gon and degrees."""
+    stations = {
+        (reading.file, reading.ids[0])
+        for reading in doubtful
+        if reading.unit == "rad" and reading.row
+    }
     members = defaultdict(list)
     files = np.isin(readings.columns["file"], list({file for file, _ in stations}))
-    there = np.isfinite(readings.columns["residual"])
-    for one in readings.where(files & there & ~readings.check):
-        if (one.file, one.ids[0]) in stations:
-            members[one.file, one.ids[0]].append(one)
-    found = []
-    for (file, station), mine in members.items():
-        free = mine[0].kind == "direction"
-        gone = [one for one in mine if one.removed]
-        mine = gone if len(gone) > 1 + free else mine
-        value = np.array([one.value for one in mine])
-        computed = value + np.array([one.residual for one in mine])
+    has_residual = np.isfinite(readings.columns["residual"])
+    for reading in readings.where(files & has_residual & ~readings.check):
+        if (reading.file, reading.ids[0]) in stations:
+            members[reading.file, reading.ids[0]].append(reading)
+    problems = []
+    for (file, station), angles in members.items():
+        # Directions have an unknown orientation, so one more reading is needed.
+        free = angles[0].kind == "direction"
+        rejected = [reading for reading in angles if reading.removed]
+        # Rejected readings show the factor best; the others may belong to the correct unit.
+        angles = rejected if len(rejected) > 1 + free else angles
+        value = np.array([reading.value for reading in angles])
+        computed = value + np.array([reading.residual for reading in angles])
         now = _scatter(computed - value, free)
         for factor, what in GON:
+            # Reduction to one turn hides whether the true value was a turn larger.
             turns = value + 2 * np.pi * np.arange(2)[:, None]
-            if len(mine) > 1 + free and _least(computed, factor * turns, free) < LEFT * now:
+            if len(angles) > 1 + free and _least(computed, factor * turns, free) < LEFT * now:
                 text = message(
                     "angles_from_station",
                     "the angles from {station} fit if they are {what}",
                     station=station,
                     what=what,
                 )
-                found.append(Problem(file, text, mine[0].row))
+                problems.append(Problem(file, text, angles[0].row))
                 break
-    return found[:TOLD]
+    return problems[:TOLD]
 
 
 def _scatter(difference, free):
-    """Root mean square of angles, about their mean direction when that is free."""
+    """Root mean square of angles, relative to their mean direction if the orientation is free."""
     turned = np.exp(1j * difference)
     middle = turned.mean() if free else 1.0
     return float(np.sqrt(np.mean(np.angle(turned * np.conj(middle)) ** 2)))
 
 
 def _least(computed, choices, free):
-    """Scatter with the better of two readings of each angle (with and without a whole turn)."""
+    """Scatter with the better of two values of each angle (with and without a full turn)."""
     difference = computed - choices
     best = difference[0]
     for _ in range(3):
+        # Alternate between the median direction and the choice of turns.
         middle = np.angle(np.median(np.cos(best)) + 1j * np.median(np.sin(best))) if free else 0.0
         away = np.abs(np.angle(np.exp(1j * (difference - middle))))
         best = np.where(away[0] <= away[1], difference[0], difference[1])
@@ -227,13 +262,13 @@ def _least(computed, choices, free):
 
 
 def mirrored_photos(adjusted):
-    """Photos of which most points were set aside, and that fit when they are mirrored."""
+    """Problem rows for photos with many rejected points that fit after mirroring."""
     images = adjusted.survey.image_points
     if images is None or images.use is None:
         return []
     n = len(adjusted.survey.photos.names)
-    lost = np.bincount(images.photo, weights=images.use == 0, minlength=n)
-    doubtful = np.flatnonzero(lost > LOST * np.bincount(images.photo, minlength=n))
+    rejected = np.bincount(images.photo, weights=images.use == 0, minlength=n)
+    doubtful = np.flatnonzero(rejected > LOST * np.bincount(images.photo, minlength=n))
     return [
         mirrored_photo(adjusted.survey.photos.names[i])
         for i in doubtful
@@ -249,25 +284,33 @@ MIRROR = message(
 
 
 def mirrored_photo(name):
-    """The Problem of a photo that fits once it is mirrored."""
+    """Problem of a photo that fits after mirroring."""
     text = message("photo_mirrored", "photo {photo}: {why}", photo=name, why=MIRROR)
     return Problem("image_points.csv", text)
 
 
 def is_photo_mirrored(adjusted, photo):
-    """Whether the points of a photo fit the adjusted ones better when it is mirrored."""
-    whole = adjusted.survey
-    images = whole.image_points
-    survey = replace(whole, image_points=replace(images, use=None))
+    """Whether the points of a photo fit the adjusted points better after mirroring."""
+    full_survey = adjusted.survey
+    images = full_survey.image_points
+    survey = replace(full_survey, image_points=replace(images, use=None))
     sight = sights_of(survey)[photo]
-    there = np.isfinite(adjusted.xyz_m[sight.point]).all(axis=1)
-    return mirrored_fits(adjusted.xyz_m[sight.point[there]], sight.ideal[there])
+    is_adjusted = np.isfinite(adjusted.xyz_m[sight.point]).all(axis=1)
+    return mirrored_fits(adjusted.xyz_m[sight.point[is_adjusted]], sight.ideal[is_adjusted])
 
 
 def mirrored_fits(xyz_m, ideal):
-    """Whether a pose from points (n, 3) seen at (n, 2) fits far better in the mirrored image."""
+    """Whether the mirrored image of points fits a pose far better.
+
+    Parameters
+    ----------
+    xyz_m : ndarray, shape (n, 3)
+    ideal : ndarray, shape (n, 2)
+        Ideal image points over c.
+    """
     if len(xyz_m) < 5:
         return False
+    # A fixed seed makes the diagnosis reproducible.
     rng = np.random.default_rng(0)
     as_is, turned = resect(xyz_m, ideal, rng), resect(xyz_m, ideal * [-1, 1], rng)
     if turned is None:

@@ -1,7 +1,7 @@
-"""Is what is held fixed wrong? A survey adjusted again with control or one scale released.
+"""Test of held quantities: adjust again with control or one scale released.
 
-Nothing is changed: where the survey then fits, and what was released is sure of its difference,
-that is told.
+No result is changed. A warning is given if the survey then fits and the released quantity differs
+significantly from its held value.
 """
 
 from dataclasses import replace
@@ -19,79 +19,104 @@ from tankcal.survey.network import adjust, snoop
 from tankcal.survey.network.snooping import start_from_adjusted
 from tankcal.survey.observations import ControlCoordinates
 
-FEWER = 0.5  # share of the values set aside that may be left by what explains them
-RELEASED_M = 0.001  # sd of fixed control while it is doubted
-SCALED = 6.0  # sds that a scale must differ from one
-SOUND = 2.0  # sigma0 of a survey that fits, where there is none to compare with
-LIKELY = 0.5  # share of the largest reaction, from which a held coordinate is released for once
-TRIED = 12  # held coordinates that are
-MOST = 25  # iterations of such a trial
-ALIKE = 1.5  # times the smallest sigma0, within which suppositions explain as much
+FEWER = 0.5  # largest remaining share of rejected values under a valid explanation
+RELEASED_M = 0.001  # sd of fixed control under test
+SCALED = 6.0  # standard deviations by which a scale must differ from one
+SOUND = 2.0  # sigma0 of a survey that fits, where no other value is available for comparison
+LIKELY = 0.5  # share of the largest reaction, above which a held coordinate is released on trial
+TRIED = 12  # held coordinates released on trial
+MOST = 25  # iterations of a trial
+ALIKE = 1.5  # ratio to the smallest sigma0, within which explanations are equivalent
 
 
-def wrongly_held(measurements, sigma0, gone, run):
-    """Problem rows on scales and fixed control without which the survey fits.
+def wrongly_held(measurements, sigma0, rejected, run):
+    """Problem rows on scales and cameras without which the survey fits.
 
-    sigma0  without data snooping, inf when the survey could not be adjusted
-    gone    number of values that data snooping set aside, inf likewise
-    run     run(measurements, snooping=False) -> (network.Adjusted, Gathered)
+    Parameters
+    ----------
+    measurements : Measurements
+    sigma0 : float
+        Without data snooping; inf if the survey could not be adjusted.
+    gone : int
+        Number of values rejected by data snooping; inf likewise.
+    run : callable
+        run(measurements, snooping=False) returns (network.Adjusted, Gathered).
+
+    Returns
+    -------
+    list of Problem
     """
-    found = []
-    if np.isfinite(gone):
+    problems = []
+    if np.isfinite(rejected):
         limit = FEWER * sigma0 if np.isfinite(sigma0) else SOUND
-        found += _explaining(_with_free_scales(measurements), limit, run)
-        found += _explaining(_with_free_cameras(measurements), limit, run)
-    return found
+        problems += _explaining(_free_scales(measurements), limit, run)
+        problems += _explaining(_free_cameras(measurements), limit, run)
+    return problems
 
 
-def wrong_control(measurements, gone, run):
-    """Problem rows on fixed control without which far fewer values are set aside; see above.
+def wrong_control(measurements, rejected, run):
+    """Problem rows on fixed control without which far fewer values are rejected.
 
-    Returns them with the number of values that would still be set aside, those of the control
-    among them; inf: no such control.
+    Parameters
+    ----------
+    measurements : Measurements
+    gone : int
+        Number of values rejected by data snooping.
+    run : callable
+        See `wrongly_held`.
+
+    Returns
+    -------
+    problems : list of Problem
+    left : int
+        Number of values still rejected, including the control; inf: no such control.
     """
     control = measurements.control
     if control is None or not (control.sd_m == 0).any():
         return [], np.inf
+    # A small standard deviation lets data snooping reject control that is otherwise exact.
     released = replace(control, sd_m=np.where(control.sd_m == 0, RELEASED_M, control.sd_m))
     try:
         trial, gathered = run(replace(measurements, control=released), snooping=True)
     except (SolutionError, InputError):
         return [], np.inf
+    # Exchanged axes explain a point completely, so they are reported first.
     swapped = find_swapped_points(trial.survey.points, trial.xyz_m, gathered.known)
-    if swapped or count_set_aside(trial.survey) > FEWER * gone:
+    if swapped or count_set_aside(trial.survey) > FEWER * rejected:
         return swapped, np.inf
     release = _Release(trial)
     found, rows = release.candidates()
     left = release.left(rows)
-    if left > FEWER * gone:  # no single point: what the trial set aside, all together
+    # No single point suffices: release everything that the trial rejected.
+    if left > FEWER * rejected:
         found, rows = release.set_aside()
         left = release.left(rows)
-    if left > FEWER * gone:
+    if left > FEWER * rejected:
         return [], np.inf
-    return [_wrong(trial, gathered.known, *one) for one in found[: 2 * LISTED]], left
+    return [_wrong(trial, gathered.known, *coordinate) for coordinate in found[: 2 * LISTED]], left
 
 
 class _Release:
-    """Held control of a trial in which it was weighted, held again but for what is released.
+    """Held control of a trial with weighted control, held again except for the released rows.
 
-    The readings that the trial set aside stay aside.
+    Readings rejected in the trial stay rejected.
     """
 
     def __init__(self, trial):
         self.survey = start_from_adjusted(trial.survey, trial)
-        self.number, one = next(
-            (i, one)
-            for i, one in enumerate(trial.survey.observations)
-            if isinstance(one, ControlCoordinates) and (one.sd == RELEASED_M).any()
+        self.number, control = next(
+            (i, control)
+            for i, control in enumerate(trial.survey.observations)
+            if isinstance(control, ControlCoordinates) and (control.sd == RELEASED_M).any()
         )
-        self.doubted = one.sd == RELEASED_M
-        self.gone = ~one.in_use
-        self.xyz_m, sd = trial.xyz_m, np.where(self.doubted, 0.0, one.sd)
-        self.control = replace(one, sd=sd, use=np.where(self.doubted | ~self.gone, 1.0, 0.0))
+        self.doubted = control.sd == RELEASED_M
+        self.gone = ~control.in_use
+        self.xyz_m, sd = trial.xyz_m, np.where(self.doubted, 0.0, control.sd)
+        self.control = replace(control, sd=sd, use=np.where(self.doubted | ~self.gone, 1.0, 0.0))
         self.limit = CRITICAL**2 * max(1.0, np.nan_to_num(trial.sigma0) ** 2)
 
     def _without(self, rows):
+        """The survey without the given rows of control."""
         use = self.control.use.copy()
         use[list(rows)] = 0.0
         observations = list(self.survey.observations)
@@ -99,56 +124,57 @@ class _Release:
         return replace(self.survey, observations=tuple(observations))
 
     def adjusted(self, rows):
-        """Adjusted without some rows of control, None: it could not be adjusted."""
+        """Adjust without some rows of control; None if the adjustment fails."""
         try:
-            with np.errstate(all="ignore"):  # a trial may go astray
+            with np.errstate(all="ignore"):  # a trial may diverge
                 return adjust(self._without(rows), max_iterations=MOST)
         except SolutionError:
             return None
 
     def left(self, rows):
-        """Number of values that must be set aside without these rows of control, they included."""
+        """Number of values rejected without the given rows of control, including these rows."""
         if not len(rows):
             return np.inf
         try:
             with np.errstate(all="ignore"):
-                found = snoop(self._without(rows), robust=False, max_iterations=MOST)
+                cleaned = snoop(self._without(rows), robust=False, max_iterations=MOST)
         except SolutionError:
             return np.inf
-        return count_set_aside(found.adjusted.survey)
+        return count_set_aside(cleaned.adjusted.survey)
 
     def candidates(self):
-        """What explains as much: (point, axis, here, given) of each, and the rows of the best one.
+        """Return equivalent explanations (point, axis, here, given), and the rows of the best one.
 
-        One coordinate after the other is released, then one whole point after the other where no
-        single coordinate will do.
+        Single coordinates are released one at a time. Whole points follow if no single coordinate
+        suffices.
         """
-        one = self.control
+        control = self.control
         single = self._tried([(row,) for row in self._likely()])
-        points = dict.fromkeys(int(one.point[rows[0]]) for rows, _ in single)
-        whole = self._tried(
-            [np.flatnonzero(self.doubted & (one.point == point)) for point in points]
+        points = dict.fromkeys(int(control.point[rows[0]]) for rows, _ in single)
+        of_points = self._tried(
+            [np.flatnonzero(self.doubted & (control.point == point)) for point in points]
         )
-        if whole and single[0][1].chi2 - whole[0][1].chi2 > self.limit:
-            single = whole
+        if of_points and single[0][1].chi2 - of_points[0][1].chi2 > self.limit:
+            single = of_points
         if not single:
             return [], ()
-        found = [
-            (one.point[row], one.axis[row], found.xyz_m[one.point[row], one.axis[row]],
-             one.value[row])
-            for rows, found in single
-            if found.chi2 - single[0][1].chi2 < self.limit
+        explanations = [
+            (control.point[row], control.axis[row],
+             trial.xyz_m[control.point[row], control.axis[row]], control.value[row])
+            for rows, trial in single
+            if trial.chi2 - single[0][1].chi2 < self.limit
             for row in rows
-            if len(rows) == 1 or self._moved(found, row)
+            if len(rows) == 1 or self._moved(trial, row)
         ]  # fmt: skip
-        return found, single[0][0]
+        return explanations, single[0][0]
 
     def _likely(self):
-        """Rows of held coordinates whose reactions are the largest, those first."""
-        found = self.adjusted(())
-        if found is None:
+        """Rows of held coordinates with the largest reactions, in decreasing order."""
+        adjusted = self.adjusted(())
+        if adjusted is None:
             return np.flatnonzero(self.doubted & self.gone)[:TRIED]
-        table = next(t for t in found.residuals if t.exact and t.source == self.number)
+        # If the adjustment converged, reactions rank the coordinates.
+        table = next(t for t in adjusted.residuals if t.exact and t.source == self.number)
         size = np.zeros(len(self.control))
         size[table.rows] = table.test_statistic
         most = size.max(initial=0.0)
@@ -157,27 +183,32 @@ class _Release:
 
     def _tried(self, trials):
         """[(rows, Adjusted without them)] of trials that could be adjusted, the best first."""
-        found = [(rows, self.adjusted(rows)) for rows in trials]
-        found = [(rows, adjusted) for rows, adjusted in found if adjusted is not None]
-        return sorted(found, key=lambda pair: pair[1].chi2)
+        results = [(rows, self.adjusted(rows)) for rows in trials]
+        results = [(rows, adjusted) for rows, adjusted in results if adjusted is not None]
+        return sorted(results, key=lambda pair: pair[1].chi2)
 
-    def _moved(self, found, row):
-        """Whether a released coordinate moved by more than its sd allows."""
+    def _moved(self, adjusted, row):
+        """Whether a released coordinate moved significantly."""
         point, axis = self.control.point[row], self.control.axis[row]
-        away = found.xyz_m[point, axis] - self.control.value[row]
-        return away**2 > self.limit * found.point_covariances_m2[point, axis, axis]
+        away = adjusted.xyz_m[point, axis] - self.control.value[row]
+        return away**2 > self.limit * adjusted.point_covariances_m2[point, axis, axis]
 
     def set_aside(self):
-        """The same of what the trial set aside, all of it together."""
-        one, rows = self.control, np.flatnonzero(self.doubted & self.gone)
+        """Candidates as in `candidates`, from all control rejected in the trial."""
+        control, rows = self.control, np.flatnonzero(self.doubted & self.gone)
         return [
-            (one.point[i], one.axis[i], self.xyz_m[one.point[i], one.axis[i]], one.value[i])
+            (
+                control.point[i],
+                control.axis[i],
+                self.xyz_m[control.point[i], control.axis[i]],
+                control.value[i],
+            )
             for i in rows
         ], rows
 
 
 def _wrong(adjusted, known, point, axis, here_m, value_m):
-    """The Problem of a held coordinate that the readings put elsewhere."""
+    """Problem of a held coordinate that contradicts the readings."""
     name = adjusted.survey.points[point]
     text = message(
         "wrongly_held",
@@ -193,76 +224,98 @@ def _wrong(adjusted, known, point, axis, here_m, value_m):
 
 
 def strained(readings, known):
-    """Problem rows on held coordinates that the readings contradict: all that explain as much.
+    """Problem rows on held coordinates that the readings contradict, all equivalent ones.
 
-    readings  Readings, those of held coordinates among them     known  Known control
+    A held coordinate is not suspected where a reading explains the contradiction better.
 
-    A held coordinate is not doubted where a reading explains the contradiction better.
+    Parameters
+    ----------
+    readings : Readings
+        Including held coordinates.
+    known : Known
+
+    Returns
+    -------
+    list of Problem
     """
     held = list(readings.where(_are_tested(readings)))
+    # Bonferroni: the level of one test is LEVEL over the number of held coordinates.
     limit = -float(ndtri(0.5 * LEVEL / max(len(held), 1)))
-    most = max((abs(one.w) for one in held), default=0.0)
+    most = max((abs(reading.w) for reading in held), default=0.0)
     if most <= limit:
         return []
-    # what explains as much as the best of all is named though it alone would not be tested
+    # Coordinates that explain as much as the best are listed even if not significant themselves.
     used = np.abs(readings.columns["w"][~readings.removed & ~readings.check])
     least = max(most, used[~np.isnan(used)].max(initial=0.0)) ** 2 - CRITICAL**2
-    found = [one for one in held if one.w**2 > least]
-    return [_strained(one) for one in sorted(found, key=lambda one: -abs(one.w))[: 2 * LISTED]]
+    suspects = [reading for reading in held if reading.w**2 > least]
+    return [
+        _strained(reading)
+        for reading in sorted(suspects, key=lambda reading: -abs(reading.w))[: 2 * LISTED]
+    ]
 
 
 def _are_tested(readings):
-    """(n,) whether Readings are held control coordinates that others test."""
-    found = readings.columns
-    return readings.are("control coordinate") & (found["sd"] == 0) & np.isfinite(found["mdb"])
+    """Mask (n,) of held control coordinates with redundancy."""
+    data = readings.columns
+    return readings.are("control coordinate") & (data["sd"] == 0) & np.isfinite(data["mdb"])
 
 
-def _strained(one):
-    """The Problem of a held coordinate with a large reaction."""
-    sd = one.mdb / noncentrality()
+def _strained(reading):
+    """Problem of a held coordinate with a large reaction."""
+    # The MDB is delta0 times the standard deviation of the released coordinate.
+    sd = reading.mdb / noncentrality()
     text = message(
         "held_contradicted",
         "{axis} of {point} is held fixed at {value_m:.4f}, but if it alone is released it becomes "
         "{here_m:.4f} (standard deviation {sd_mm:.1f} mm, w = {w:.1f}): it may be wrong",
-        axis=one.element,
-        point=one.ids[0],
-        value_m=one.value,
-        here_m=one.value + one.w * sd,
+        axis=reading.element,
+        point=reading.ids[0],
+        value_m=reading.value,
+        here_m=reading.value + reading.w * sd,
         sd_mm=1e3 * sd,
-        w=one.w,
+        w=reading.w,
     )
-    return Problem(one.file, text, one.row, f"{one.element}_m")
+    return Problem(reading.file, text, reading.row, f"{reading.element}_m")
 
 
 def _explaining(trials, limit, run):
-    """Problem rows of trials with which the survey fits, and that what was set free is sure of.
+    """Problem rows of trials in which the survey fits and the released quantity differs
+    significantly.
 
-    trials  (changed measurements, difference), the latter a function of the network.Adjusted: what
-            was set free less what it was held at, its sd, and the Problem that says so; or None
+    Parameters
+    ----------
+    trials : iterable
+        (changed measurements, difference). difference(network.Adjusted) returns released minus held
+        value, its standard deviation and a Problem; or None.
+    limit : float
+        sigma0 below which the survey fits.
+    run : callable
     """
-    found = []
+    explained = []
     for changed, difference in trials:
         try:
             adjusted, _ = run(changed)
         except (SolutionError, InputError):
             continue
-        told = difference(adjusted) if adjusted.sigma0 < limit else None
-        if told is not None:
-            away, sd, problem = told
+        released = difference(adjusted) if adjusted.sigma0 < limit else None
+        if released is not None:
+            away, sd, problem = released
+            # sigma0 above 1 enlarges the uncertainty of the difference.
             if abs(away) > SCALED * max(adjusted.sigma0, 1.0) * sd:
-                found.append((adjusted.sigma0, problem))
-    best = min((sigma0 for sigma0, _ in found), default=np.inf)
-    return [problem for sigma0, problem in found if sigma0 < ALIKE * best]
+                explained.append((adjusted.sigma0, problem))
+    best = min((sigma0 for sigma0, _ in explained), default=np.inf)
+    return [problem for sigma0, problem in explained if sigma0 < ALIKE * best]
 
 
 def _sd_of(adjusted, column):
+    """A priori standard deviation of an unknown; 0 for a fixed one."""
     if column < 0:
         return 0.0
     return float(adjusted.solution.cofactor.among(np.array([column]))[0, 0]) ** 0.5
 
 
 def _scale(name):
-    """What an adjustment says of the free scale of an instrument."""
+    """Difference function of the free scale of an instrument, for `_explaining`."""
 
     def difference(adjusted):
         names = [one.name for one in adjusted.survey.instruments]
@@ -285,7 +338,7 @@ def _scale(name):
 
 
 def _principal_distance(name, held_mm):
-    """What an adjustment says of the free principal distance of a camera."""
+    """Difference function of the free principal distance of a camera, for `_explaining`."""
 
     def difference(adjusted):
         names = [one.name for one in adjusted.survey.cameras]
@@ -308,38 +361,40 @@ def _principal_distance(name, held_mm):
     return difference
 
 
-def _with_free_cameras(measurements):
-    """Trials with the principal distance of one camera free."""
-    for number, one in enumerate(measurements.cameras):
-        camera = one.camera
+def _free_cameras(measurements):
+    """Yield trials with the principal distance of one camera free."""
+    for number, setup in enumerate(measurements.cameras):
+        camera = setup.camera
         if camera.scope[0] not in ("off", "photo") and camera.state[0] == "free":
             continue
         free = replace(
             camera, scope=("camera", *camera.scope[1:]), state=("free", *camera.state[1:])
         )
         cameras = list(measurements.cameras)
-        cameras[number] = replace(one, camera=free)
+        cameras[number] = replace(setup, camera=free)
         changed = replace(measurements, cameras=tuple(cameras))
         yield changed, _principal_distance(camera.name, camera.values[0])
 
 
-def _with_free_scales(measurements):
-    """Trials with the scale of one instrument free.
+def _free_scales(measurements):
+    """Yield trials with the scale of one instrument free.
 
-    Readings without one are taken for those of one instrument that bears the name of their file.
+    Readings without an instrument form one instrument, named after their file.
     """
     for tool in measurements.instruments:
         if np.isfinite(tool.u_scale):
-            others = tuple(one for one in measurements.instruments if one is not tool)
+            others = tuple(item for item in measurements.instruments if item is not tool)
             freed = (*others, replace(tool, u_scale=np.nan))
             yield replace(measurements, instruments=freed), _scale(tool.name)
     for table in measurements.readings:
         if table.table == "distances" and None in (table.instrument or (None,)):
-            names = tuple(one or table.file for one in table.instrument or (None,) * len(table.end))
+            names = tuple(
+                item or table.file for item in table.instrument or (None,) * len(table.end)
+            )
             free = Instrument(table.file, "other", u_scale=np.nan)
             readings = tuple(
-                replace(one, instrument=names) if one is table else one
-                for one in measurements.readings
+                replace(item, instrument=names) if item is table else item
+                for item in measurements.readings
             )
             tools = (*measurements.instruments, free)
             yield replace(measurements, instruments=tools, readings=readings), _scale(table.file)

@@ -1,7 +1,7 @@
-"""A survey that does not fit, tried again as if a whole file had been misread.
+"""Trial adjustments of a survey that does not fit, as if a whole file had been misread.
 
-Each supposition changes the measurements as one common mistake would, and the survey is adjusted
-again, without data snooping. The one that brings sigma0 down most is told; nothing is changed.
+Each trial changes the measurements as one common mistake would, and adjusts without data snooping.
+The mistake that reduces sigma0 most is reported; no result is changed.
 """
 
 from dataclasses import replace
@@ -16,69 +16,83 @@ from tankcal.survey.diagnosis.diagnoses import GON, MIRROR, mirrored_fits, mirro
 from tankcal.survey.diagnosis.fixed_datum_check import ALIKE
 from tankcal.survey.observations import KINDS
 
-BETTER = 0.2  # share of sigma0 that may be left by what explains a survey
-SOUND = 5.0  # sigma0 of a survey that fits, if not well: a single blunder makes more of it
-CERTAIN = 2.0  # sigma0 after which nothing else is tried
+BETTER = 0.2  # largest remaining share of sigma0 under a valid explanation
+SOUND = 5.0  # sigma0 of a survey that fits moderately; a single blunder causes more
+CERTAIN = 2.0  # sigma0 below which no other mistake is tried
 OTHER_UNITS = (
     (0.3048, message("feet", "feet")),
     (0.001, message("millimetres", "millimetres")),
 )
 HORIZONTAL = ("directions", "horizontal_angles", "azimuths")
-EXCHANGED = 7  # control points of which each two are exchanged
+EXCHANGED = 7  # control points up to which all pairs are exchanged
 CONTROL = "control.csv"
-MOST_SETUPS = 30  # whose circles are supposed, one after the other, to show another unit
-MOST = 12  # photos that are left out one after the other
-ALIKE_FAILURES = 6  # trials that end as the survey itself did: then readings are missing
+MOST_SETUPS = 30  # set-ups whose circles are tried in another unit
+MOST = 12  # photos left out one at a time
+ALIKE_FAILURES = 6  # trials that fail like the survey itself: readings are then missing
 
 
 def likely_mistake(measurements, sigma0, run, failure=None):
-    """Problem rows: the common mistakes that explain best why a survey does not fit, or none.
+    """Problem rows: the common mistakes that explain a misfit best, or none.
 
-    sigma0   without data snooping, inf when the survey could not be adjusted
-    run      run(measurements) -> (network.Adjusted, Gathered), without data snooping
-    failure  the text of the error by which the survey could not be adjusted
+    Parameters
+    ----------
+    measurements : Measurements
+    sigma0 : float
+        Without data snooping; inf if the survey could not be adjusted.
+    run : callable
+        run(measurements) returns (network.Adjusted, Gathered), without data snooping.
+    failure : str, optional
+        Error message of the failed adjustment.
+
+    Returns
+    -------
+    list of Problem
     """
     limit = min(BETTER * sigma0, SOUND)
     explained, alike = [], 0
-    for suppositions in (_mirrored, _in_other_units, _exchanged, _of_a_setup):
+    for suppositions in (_mirrored, _files_in_other_unit, _exchanged, _setup_in_other_unit):
         for problem, changed in suppositions(measurements):
             try:
-                found = run(changed)[0].sigma0
+                trial_sigma0 = run(changed)[0].sigma0
             except (SolutionError, InputError) as error:
                 alike += str(error) == failure
                 if alike == ALIKE_FAILURES and not explained:
                     return []
                 continue
-            if found < limit:
-                explained.append((found, problem))
-        if any(found < CERTAIN for found, _ in explained):
+            if trial_sigma0 < limit:
+                explained.append((trial_sigma0, problem))
+        if any(trial_sigma0 < CERTAIN for trial_sigma0, _ in explained):
             break
-    best = min((found for found, _ in explained), default=np.inf)
-    likely = [problem for found, problem in explained if found < ALIKE * best]
+    best = min((trial_sigma0 for trial_sigma0, _ in explained), default=np.inf)
+    likely = [problem for trial_sigma0, problem in explained if trial_sigma0 < ALIKE * best]
     if measurements.settings.datum == "control":
         return likely
-    # coordinates that hold no datum are starts: swapped ones alone do no harm, but a circle does
+    # Coordinates that hold no datum serve as start values: swapped axes alone do no harm, a circle
+    # does.
     return sorted(likely, key=lambda problem: problem.file == CONTROL)
 
 
 def _mirrored(measurements):
-    """Pairs (Problem, measurements as they would be without that mistake): a world in a mirror.
+    """Yield (Problem, corrected measurements) for mistakes that mirror the survey.
 
-    Which of these it is cannot always be told.
+    The mistakes are not always distinguishable.
     """
-    yield from _of_control(measurements)
-    yield from _of_images(measurements)
-    for one in measurements.readings:
-        if one.table in HORIZONTAL:
+    yield from _control_swapped(measurements)
+    yield from _images_mirrored(measurements)
+    for table_of_readings in measurements.readings:
+        if table_of_readings.table in HORIZONTAL:
             text = message(
                 "angles_anticlockwise",
                 "the angles fit if the circle was read anticlockwise",
             )
-            yield Problem(one.file, text), _times(measurements, [one.table], -1.0)
+            yield (
+                Problem(table_of_readings.file, text),
+                _times(measurements, [table_of_readings.table], -1.0),
+            )
 
 
 def _exchanged(measurements):
-    """The same of two control points that bear one another's names."""
+    """Yield (Problem, corrected measurements) for two control points with exchanged names."""
     control = measurements.control
     names = [] if control is None else list(control.point)
     if not 2 < len(names) <= EXCHANGED or measurements.image_points is not None:
@@ -98,10 +112,14 @@ def _exchanged(measurements):
             yield Problem("control.csv", text, row, "point"), replace(measurements, control=changed)
 
 
-def _in_other_units(measurements):
-    """The same of a file in another unit."""
+def _files_in_other_unit(measurements):
+    """Yield (Problem, corrected measurements) for files in another unit."""
     tables = measurements.readings
-    angles = [one.table for one in tables if KINDS[one.table].is_angle]
+    angles = [
+        readings_of_table.table
+        for readings_of_table in tables
+        if KINDS[readings_of_table.table].is_angle
+    ]
     for factor, what in GON:
         if len(angles) > 1:
             template = "all angles together fit if they are {what}"
@@ -111,21 +129,24 @@ def _in_other_units(measurements):
         for table in angles:
             yield Problem(f"{table}.csv", text), _times(measurements, [table], factor)
     for table in ("distances", "slope_distances"):
-        if any(one.table == table for one in tables) and _scale_is_known(measurements, table):
+        # A change of unit shows only if control or other distances fix the scale.
+        if any(
+            readings_of_table.table == table for readings_of_table in tables
+        ) and _scale_is_known(measurements, table):
             for factor, what in OTHER_UNITS:
                 template = "the distances fit if they are in {what}"
                 text = message("distances_misread", template, what=what)
                 yield Problem(f"{table}.csv", text), _times(measurements, [table], factor)
 
 
-def _of_a_setup(measurements):
-    """The same of the circles of one set-up in another unit, of all its tables or of one."""
-    tables = [one for one in measurements.readings if one.setup and KINDS[one.table].is_angle]
-    names = list(dict.fromkeys(name for one in tables for name in one.setup))
+def _setup_in_other_unit(measurements):
+    """Yield (Problem, corrected measurements) for the circles of one set-up in another unit."""
+    tables = [item for item in measurements.readings if item.setup and KINDS[item.table].is_angle]
+    names = list(dict.fromkeys(name for item in tables for name in item.setup))
     if not 1 < len(names) <= MOST_SETUPS or measurements.image_points is not None:
         return
     for name in names:
-        mine = [one for one in tables if name in one.setup]
+        tables_of_setup = [item for item in tables if name in item.setup]
         for factor, what in GON:
             text = message(
                 "setup_misread",
@@ -133,24 +154,34 @@ def _of_a_setup(measurements):
                 setup=name,
                 what=what,
             )
-            for chosen in ([mine] if len(mine) > 1 else []) + [[one] for one in mine]:
-                first = chosen[0]
+            for group in ([tables_of_setup] if len(tables_of_setup) > 1 else []) + [
+                [item] for item in tables_of_setup
+            ]:
+                first = group[0]
                 row = first.rows[first.setup.index(name)] if first.rows else None
-                of = tuple(one.table for one in chosen)
-                yield Problem(first.file, text, row), _times(measurements, of, factor, name)
+                table_names = tuple(item.table for item in group)
+                yield (
+                    Problem(first.file, text, row),
+                    _times(measurements, table_names, factor, name),
+                )
 
 
-def _of_control(measurements):
-    """x and y of control exchanged, in all systems, then in one of several."""
+def _control_swapped(measurements):
+    """Yield trials with x and y of control exchanged, in all systems, then in each of several."""
     control = measurements.control
     if control is None:
         return
-    of = np.array([name or "" for name in control.system], dtype=object)
-    for system in (None, *sorted(set(of.tolist()))):
-        mine = np.ones(len(of), dtype=bool) if system is None else of == system
-        if system is None or not mine.all():
+    system_of_row = np.array([name or "" for name in control.system], dtype=object)
+    for system in (None, *sorted(set(system_of_row.tolist()))):
+        is_in_system = (
+            np.ones(len(system_of_row), dtype=bool) if system is None else system_of_row == system
+        )
+        if system is None or not is_in_system.all():
             xyz, sd = control.xyz_m.copy(), control.sd_m.copy()
-            xyz[mine], sd[mine] = xyz[mine][:, [1, 0, 2]], sd[mine][:, [1, 0, 2]]
+            xyz[is_in_system], sd[is_in_system] = (
+                xyz[is_in_system][:, [1, 0, 2]],
+                sd[is_in_system][:, [1, 0, 2]],
+            )
             text = message("all_coordinates_swapped", "all coordinates fit if x and y are swapped")
             if system:
                 text = message(
@@ -162,17 +193,19 @@ def _of_control(measurements):
             yield Problem("control.csv", text), replace(measurements, control=changed)
 
 
-def _of_images(measurements):
-    """Images mirrored, of all cameras, then of one of several."""
+def _images_mirrored(measurements):
+    """Yield trials with mirrored images, of all cameras, then of each of several."""
     images = measurements.image_points
     if images is None:
         return
-    camera_of = {one.name: one.camera for one in measurements.photos}
-    of = np.array([camera_of.get(name, "") for name in images.photo], dtype=object)
-    for camera in (None, *sorted(set(of.tolist()))):
-        mine = np.ones(len(of), dtype=bool) if camera is None else of == camera
-        if camera is None or not mine.all():
-            xy = np.where(mine[:, None], images.xy_mm * [-1.0, 1.0], images.xy_mm)
+    camera_of = {item.name: item.camera for item in measurements.photos}
+    camera_of_row = np.array([camera_of.get(name, "") for name in images.photo], dtype=object)
+    for camera in (None, *sorted(set(camera_of_row.tolist()))):
+        is_of_camera = (
+            np.ones(len(camera_of_row), dtype=bool) if camera is None else camera_of_row == camera
+        )
+        if camera is None or not is_of_camera.all():
+            xy = np.where(is_of_camera[:, None], images.xy_mm * [-1.0, 1.0], images.xy_mm)
             text = MIRROR
             if camera is not None:
                 text = message(
@@ -183,51 +216,64 @@ def _of_images(measurements):
 
 
 def _scale_is_known(measurements, table):
-    """Whether distances of a table cannot fit in any unit: their scale and that of control hold."""
-    free = {one.name for one in measurements.instruments if np.isnan(one.u_scale)}
-    setups = {one.name: one.instrument for one in measurements.setups}
-    of = [one for one in measurements.readings if one.table == table]
-    others = any("distances" in one.table for one in measurements.readings if one.table != table)
+    """Whether the scale of distances is controlled, so that a wrong unit causes a misfit."""
+    free = {item.name for item in measurements.instruments if np.isnan(item.u_scale)}
+    setups = {item.name: item.instrument for item in measurements.setups}
+    readings_of_table = [item for item in measurements.readings if item.table == table]
+    has_others = any(
+        "distances" in item.table for item in measurements.readings if item.table != table
+    )
     acting = measurements.control is not None and measurements.settings.datum == "control"
-    return (acting or others) and not any(
-        free & ({setups[name] for name in one.setup} | set(one.instrument)) for one in of
+    return (acting or has_others) and not any(
+        free & ({setups[name] for name in item.setup} | set(item.instrument))
+        for item in readings_of_table
     )
 
 
 def _times(measurements, tables, factor, setup=None):
-    """The values of tables times a factor; of one set-up alone where it is named."""
+    """Multiply the values of tables by a factor, or only those of one set-up."""
 
-    def by(one):
+    def factor_of(item):
         if setup is None:
             return factor
-        return np.where([name == setup for name in one.setup], factor, 1.0)
+        return np.where([name == setup for name in item.setup], factor, 1.0)
 
     readings = tuple(
-        replace(one, value=one.value * by(one)) if one.table in tables else one
-        for one in measurements.readings
+        replace(item, value=item.value * factor_of(item)) if item.table in tables else item
+        for item in measurements.readings
     )
     return replace(measurements, readings=readings)
 
 
 def photos_that_do_not_fit(measurements, message, run):
-    """Problem rows for photos that found no place and that fit when they are mirrored.
+    """Problem rows for photos without a pose that fit after mirroring.
 
-    message  of the error, which names these photos        run  see `likely_mistake`
+    Parameters
+    ----------
+    measurements : Measurements
+    message : str
+        Error message, which names these photos.
+    run : callable
+        See `likely_mistake`.
+
+    Returns
+    -------
+    list of Problem
     """
     images = measurements.image_points
-    lost = [one.name for one in measurements.photos if f"photo {one.name} " in message][:MOST]
-    if images is None or not lost or len(lost) == len(measurements.photos):
+    failed = [item.name for item in measurements.photos if f"photo {item.name} " in message][:MOST]
+    if images is None or not failed or len(failed) == len(measurements.photos):
         return []
-    kept = np.array([name not in lost for name in images.photo])
+    is_kept = np.array([name not in failed for name in images.photo])
     try:
-        adjusted, _ = run(replace(measurements, image_points=_some(images, kept)))
+        adjusted, _ = run(replace(measurements, image_points=_some(images, is_kept)))
     except (SolutionError, InputError):
         return []
-    return [mirrored_photo(name) for name in lost if _is_mirrored(measurements, name, adjusted)]
+    return [mirrored_photo(name) for name in failed if _is_mirrored(measurements, name, adjusted)]
 
 
 def _is_mirrored(measurements, name, adjusted):
-    """Whether a photo that was left out fits the adjusted points when it is mirrored."""
+    """Whether a photo left out of the adjustment fits the adjusted points after mirroring."""
     images = measurements.image_points
     number = {name: i for i, name in enumerate(adjusted.survey.points)}
     rows = [
@@ -235,16 +281,17 @@ def _is_mirrored(measurements, name, adjusted):
         for i, (photo, point) in enumerate(zip(images.photo, images.point, strict=True))
         if photo == name and point in number
     ]
-    of = next(one.camera for one in measurements.photos if one.name == name)
-    camera = next(one.camera for one in measurements.cameras if one.camera.name == of)
+    camera_name = next(item.camera for item in measurements.photos if item.name == name)
+    camera = next(item.camera for item in measurements.cameras if item.camera.name == camera_name)
     xyz = adjusted.xyz_m[[number[images.point[i]] for i in rows]]
-    there = np.isfinite(xyz).all(axis=1)
+    is_adjusted = np.isfinite(xyz).all(axis=1)
     ideal = correct_image_points(images.xy_mm[rows], camera.values, camera.form) / camera.values[0]
-    return mirrored_fits(xyz[there], ideal[there])
+    return mirrored_fits(xyz[is_adjusted], ideal[is_adjusted])
 
 
-def _some(images, kept):
-    rows = np.flatnonzero(kept)
+def _some(images, mask):
+    """ImageReadings of the rows where a mask (n,) is True."""
+    rows = np.flatnonzero(mask)
     return replace(
         images,
         photo=tuple(images.photo[i] for i in rows),

@@ -1,12 +1,13 @@
-"""Are the readings that were set aside blunders, or victims of something wrong that was kept?
+"""Attribution of outliers: blunders in readings, or valid readings rejected because of an error in
+another item that was kept.
 
-A search for blunders believes the majority and what is held fixed. Of single blunders it leaves
-their traces everywhere; where it took far more readings of one thing (a point with known
-coordinates, a photo, an instrument) than of all others, that thing is told:
+Data snooping trusts the majority and whatever is held fixed. Single blunders occur everywhere. If
+one item (a point with known coordinates, a photo, an instrument) lost far more readings than all
+others, that item is reported:
 
-    P(k or more of n | p) < 0.001 / number of things,   p = (K + 1) / (N + 2)
+    P(k or more of n | p) < 0.001 / number of items,   p = (K + 1) / (N + 2)
 
-with k of its n values set aside and K of the N values of everything else.
+with k of its n values rejected and K of the N values of all other items.
 """
 
 from collections import defaultdict
@@ -21,16 +22,23 @@ from tankcal.survey.network.separability import alternatives
 from tankcal.survey.network.survey import IMAGES
 
 LEVEL = 0.001
-MANY = 0.12  # share of all values set aside, above which these are hardly single blunders
-SOME = 0.02  # share above which what is held fixed is doubted for once
+MANY = 0.12  # share of rejected values above which single blunders are improbable
+SOME = 0.02  # share above which held quantities are tested
 LISTED = 4
-TESTED = 60  # readings set aside of which it is asked whether others might have been
+TESTED = 60  # rejected readings examined for alternatives
 
 
 def find_one_sided_losses(readings, known):
-    """Problem rows on things that lost many more of their values than everything else.
+    """Problem rows on items that lost far more of their values than all others.
 
-    readings  Readings                  known  Known control
+    Parameters
+    ----------
+    readings : Readings
+    known : Known
+
+    Returns
+    -------
+    list of Problem
     """
     used = readings.where(~readings.check & (readings.columns["file"] != "cameras.toml"))
     total, gone = len(used), int(used.removed.sum())
@@ -38,23 +46,29 @@ def find_one_sided_losses(readings, known):
         return []
     things = defaultdict(lambda: [0, 0])
     rows = (used.columns[name].tolist() for name in ("kind", "file", "ids", "removed"))
-    for *one, removed in zip(*rows, strict=True):
-        for thing in _things(*one, known):
+    for *identity, removed in zip(*rows, strict=True):
+        for thing in _things(*identity, known):
             things[thing][0] += 1
             things[thing][1] += removed
-    found = []
+    suspects = []
     for (file, name), (n, k) in things.items():
+        # Laplace estimate of the rate of rejection of everything else.
         p = (gone - k + 1) / (total - n + 2)
+        # betainc(k, n - k + 1, p) is the binomial probability of k or more rejections.
         if k > 2 and n < total and betainc(k, n - k + 1, p) < LEVEL / len(things):
-            told = _far_more(name, k, n) if file == "control.csv" else _much_of_photo(name, k, n)
+            text = _far_more(name, k, n) if file == "control.csv" else _much_of_photo(name, k, n)
             row = known.row.get(name) if file == "control.csv" else None
-            found.append((k / n, Problem(file, told, row)))
-    found.sort(key=lambda pair: -pair[0])
-    return [*_lost_control(used), *(one for _, one in found[:LISTED]), *_many(gone, total)]
+            suspects.append((k / n, Problem(file, text, row)))
+    suspects.sort(key=lambda pair: -pair[0])
+    return [
+        *_lost_control(used),
+        *(identity for _, identity in suspects[:LISTED]),
+        *_many(gone, total),
+    ]
 
 
 def _things(kind, file, ids, known):
-    """(file, name) of what a value hangs on."""
+    """Yield (file, name) of the items on which a value depends."""
     if kind == "image coordinate":
         yield file, ids[0]
     for name in dict.fromkeys(ids):
@@ -63,6 +77,7 @@ def _things(kind, file, ids, known):
 
 
 def _far_more(name, k, n):
+    """Sentence about a control point with many rejected readings."""
     return message(
         "point_lost_much",
         "{gone} of the {count} values measured to point {point} were rejected, far more than of"
@@ -74,6 +89,7 @@ def _far_more(name, k, n):
 
 
 def _much_of_photo(name, k, n):
+    """Sentence about a photo with many rejected points."""
     return message(
         "photo_lost_much",
         "{gone} of the {count} values of photo {photo} were rejected, far more than of "
@@ -85,31 +101,34 @@ def _much_of_photo(name, k, n):
 
 
 def _lost_control(readings):
-    """Known coordinates that were set aside."""
-    gone = [
-        one
-        for one in readings.where(readings.removed)
-        if one.kind.startswith("control coordinate") and np.isfinite(one.residual)
+    """Problem rows of rejected known coordinates."""
+    rejected = [
+        reading
+        for reading in readings.where(readings.removed)
+        if reading.kind.startswith("control coordinate") and np.isfinite(reading.residual)
     ]
     return [
-        Problem(one.file, _lost(one), one.row, f"{one.element}_m") for one in gone[: 2 * LISTED]
+        Problem(reading.file, _lost(reading), reading.row, f"{reading.element}_m")
+        for reading in rejected[: 2 * LISTED]
     ]
 
 
-def _lost(one):
+def _lost(reading):
+    """Sentence about a rejected known coordinate."""
     return message(
         "control_set_aside",
         "{axis} of {point} was rejected: given as {value_m:.4f} (sd {sd_m:.4f}), but the "
         "readings give {here_m:.4f}",
-        axis=one.element,
-        point=one.ids[0],
-        value_m=one.value,
-        sd_m=one.sd,
-        here_m=one.value + one.residual,
+        axis=reading.element,
+        point=reading.ids[0],
+        value_m=reading.value,
+        sd_m=reading.sd,
+        here_m=reading.value + reading.residual,
     )
 
 
 def _many(gone, total):
+    """Problem rows if more values were rejected than single blunders explain."""
     if gone < 3 or gone <= MANY * total:
         return []
     text = message(
@@ -124,54 +143,67 @@ def _many(gone, total):
 
 
 def find_undecided_outliers(adjusted, removed, held, held_trace):
-    """Problem rows of readings set aside in whose place others might have been.
+    """Problem rows of rejected readings for which another reading may be wrong instead.
 
-    removed     tuple of network.snooping.Removed, the worst first
-    held        network.reactions.Reactions of held coordinates        held_trace  their Trace
+    Parameters
+    ----------
+    adjusted : network.Adjusted
+    removed : sequence of network.snooping.Removed
+        The worst first.
+    held : network.reactions.Reactions
+        Reactions of held coordinates.
+    held_trace : Trace
+
+    Returns
+    -------
+    list of Problem
     """
-    found = []
-    for one in removed[:TESTED]:
-        others = alternatives(adjusted, one.source, one.row, held)
+    problems = []
+    for rejected in removed[:TESTED]:
+        others = alternatives(adjusted, rejected.source, rejected.row, held)
         if others:
-            names = [_named(adjusted, held_trace, *other) for other in others]
+            names = [
+                _reading_in_words(adjusted, held_trace, *alternative) for alternative in others
+            ]
             text = message(
                 "undecided",
                 "{reading} was rejected, but the error may equally be in {others}: the "
                 "readings cannot decide",
-                reading=_named(adjusted, held_trace, one.source, one.row),
+                reading=_reading_in_words(adjusted, held_trace, rejected.source, rejected.row),
                 others=_either(names),
             )
-            trace = adjusted.survey.table(one.source).trace
-            found.append(Problem(trace.file, text, trace.rows[one.row]))
-    if len(found) > LISTED:
+            trace = adjusted.survey.table(rejected.source).trace
+            problems.append(Problem(trace.file, text, trace.rows[rejected.row]))
+    if len(problems) > LISTED:
         text = message(
             "more_undecided",
             "the same is true of {more} more readings that were rejected",
-            more=len(found) - LISTED,
+            more=len(problems) - LISTED,
         )
-        found[LISTED:] = [Problem("job.toml", text, None, "adjustment.snooping")]
-    return found
+        # Further cases are counted in one line.
+        problems[LISTED:] = [Problem("job.toml", text, None, "adjustment.snooping")]
+    return problems
 
 
 def _either(names):
-    """Readings of which each may be the wrong one."""
+    """A list of alternatives, in words."""
     if len(names) > LISTED:
         return message("one_of", "one of {names}", names=list_some(names, LISTED))
     return join_with_or(names)
 
 
-def _named(adjusted, held_trace, source, row):
+def _reading_in_words(adjusted, held_trace, source, row):
     """A reading in words."""
-    one = adjusted.survey.table(source)
-    trace = held_trace if one is None else one.trace
+    observations = adjusted.survey.table(source)
+    trace = held_trace if observations is None else observations.trace
     ids = trace.ids[row]
     if source == IMAGES:
         return image_point_label(*ids)
-    kind = "control coordinate" if one is None else one.kind
-    of = trace.table.replace("_", " ") or kind.removesuffix(" of a further system")
+    kind = "control coordinate" if observations is None else observations.kind
+    table_name = trace.table.replace("_", " ") or kind.removesuffix(" of a further system")
     name, kind = (
         " ".join(filter(None, ["-".join(ids), trace.element[row][0]])),
-        of.removesuffix("s"),
+        table_name.removesuffix("s"),
     )
     if trace.rows[row] is None:
         return message("reading", "{kind} {name}", kind=kind, name=name)
@@ -180,5 +212,5 @@ def _named(adjusted, held_trace, source, row):
 
 
 def count_set_aside(survey):
-    """Number of values that the survey of an adjustment leaves out."""
-    return sum(one.rows * int(np.sum(~one.in_use)) for one in survey.tables.values())
+    """Number of values that an adjusted survey rejects."""
+    return sum(table.rows * int(np.sum(~table.in_use)) for table in survey.tables.values())

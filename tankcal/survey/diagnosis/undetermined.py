@@ -1,4 +1,4 @@
-"""Points that cannot be adjusted, and coordinates that no observation touches."""
+"""Points that cannot be adjusted, and coordinates without observations."""
 
 import numpy as np
 
@@ -11,13 +11,15 @@ SHOWN = 5  # points in a sentence
 
 
 def find_left_out(survey):
-    """{point: why} of the points that have too few observations."""
+    """{point: reason} of the points with too few observations."""
     plan, height, rows, rays, measured = _counts(survey)
     held = np.zeros((len(survey.points), 3), dtype=bool) if survey.fixed is None else survey.fixed
     plan_held, height_held = held[:, :2].sum(axis=1), held[:, 2]
     in_plan, in_height = plan > 0, height > 0
+    # A point observed in plan needs two values, one observed in height needs one.
     needed = 2 * in_plan + in_height
     have = rows + plan_held * in_plan + height_held * in_height
+    # Enough values in total may still lack one of the plan coordinates.
     poor = (have < needed) | (in_plan & (plan + plan_held < 2)) | ~measured
     return {
         survey.points[i]: _why(survey.points[i], rays[i], rows[i], needed[i], measured[i])
@@ -26,6 +28,7 @@ def find_left_out(survey):
 
 
 def _why(name, rays, rows, needed, measured):
+    """Reason for leaving out a point."""
     if not measured:
         return unmeasured_sentence(name)
     if rays == 1 and rows == 2:
@@ -40,12 +43,12 @@ def _why(name, rays, rows, needed, measured):
 
 
 def unmeasured_sentence(name):
-    """What is said of a point that nothing measured."""
+    """Sentence about a point without measurements."""
     return message("not_measured", "point {point} is not measured", point=name)
 
 
 def find_untouched_coordinates(survey):
-    """(points, 3) True where nothing touches a coordinate, and warnings that say so."""
+    """Mask (points, 3) of coordinates without observations, and warnings about them."""
     plan, height, _, _, _ = _counts(survey)
     idle = np.column_stack([plan == 0, plan == 0, height == 0])
     warnings = []
@@ -63,7 +66,8 @@ def find_untouched_coordinates(survey):
 
 
 def _counts(survey):
-    """Rows that speak about plan, height and all of each point; its rays; whether measured."""
+    """Numbers of values for plan, height and all of each point; its rays; whether it is
+    measured."""
     n = len(survey.points)
     plan, height, rows = np.zeros((3, n), dtype=int)
     rays, measured = np.zeros(n, dtype=int), np.zeros(n, dtype=bool)
@@ -73,24 +77,28 @@ def _counts(survey):
         measured |= rays > 0
         for counter in (plan, height, rows):
             counter += 2 * rays
-    for one in survey.observations:
-        if isinstance(one, ControlCoordinates):
-            _add_control(one, plan, height, rows)
+    for table in survey.observations:
+        if isinstance(table, ControlCoordinates):
+            _add_control(table, plan, height, rows)
             continue
-        if not one.ties:
+        if not table.ties:
             continue
-        _, lines = np.unique([getattr(one, name) for name in one.ties], axis=1, return_index=True)
-        for name in one.ties:
-            count = one.rows * np.bincount(getattr(one, name)[lines], minlength=n)
-            plan += count * (0 in one.axes)
-            height += count * (2 in one.axes)
+        # Repeated readings of one line count once.
+        _, lines = np.unique(
+            [getattr(table, name) for name in table.ties], axis=1, return_index=True
+        )
+        for name in table.ties:
+            count = table.rows * np.bincount(getattr(table, name)[lines], minlength=n)
+            plan += count * (0 in table.axes)
+            height += count * (2 in table.axes)
             rows += count
-            measured |= (count > 0) & one.of_survey
+            measured |= (count > 0) & table.of_survey
     return plan, height, rows, rays, measured
 
 
-def _add_control(one, plan, height, rows):
-    flat = one.axis < 2
-    np.add.at(plan, one.point[flat], 1)
-    np.add.at(height, one.point[~flat], 1)
-    np.add.at(rows, one.point, 1)
+def _add_control(control, plan, height, rows):
+    """Add control coordinates to the counts."""
+    flat = control.axis < 2
+    np.add.at(plan, control.point[flat], 1)
+    np.add.at(height, control.point[~flat], 1)
+    np.add.at(rows, control.point, 1)

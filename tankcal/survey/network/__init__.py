@@ -1,6 +1,6 @@
-"""The network: everything that was observed on site, in one adjustment.
+"""The network: all observations of a site in one adjustment.
 
-Names are resolved when they are first used: reading a job needs a Camera, not the solver.
+Names are imported on first use, so that reading a job imports a Camera but not the solver.
 """
 
 from importlib import import_module

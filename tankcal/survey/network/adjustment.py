@@ -1,4 +1,4 @@
-"""Adjust a survey: one call from observations to adjusted points with their covariance."""
+"""Adjustment of a network survey: from observations to adjusted points with their covariance."""
 
 from dataclasses import replace
 
@@ -15,22 +15,31 @@ from tankcal.survey.observations import PlumbLines
 
 
 def adjust(survey, *, datum="control", over=None, photo=None, tolerance=1e-4, max_iterations=100):
-    """Least squares of all observations of a Survey.
-
-    Returns an Adjusted. Raises SolutionError when something is not determined: a datum defect in
-    words, points and parameters by name; or when the iteration does not converge.
+    """Least squares adjustment of all observations of a survey.
 
     Parameters
     ----------
-    datum : optional
-        "control": whatever is known of points and photos must fix it; "inner": what is not
-        fixed is chosen so that the points keep their places on the whole (free network).
-    over : ndarray, shape (k,), optional
-        Points that take part in the inner constraints, None: all.
-    photo : optional
-        Number of the photo that takes part in their place; None: points do.
-    tolerance : optional
+    survey : Survey
+    datum : str
+        "control": known points and photos must fix the datum; "inner": free network, in which the
+        points keep their positions on average.
+    over : ndarray of int, shape (k,), optional
+        Points in the inner constraints; None: all.
+    photo : int, optional
+        Photo in the inner constraints in place of points.
+    tolerance : float
         Of the last step, see tankcal.solver.solve.
+    max_iterations : int
+
+    Returns
+    -------
+    Adjusted
+
+    Raises
+    ------
+    SolutionError
+        If unknowns or the datum are undetermined (the message names them), or if the iteration does
+        not converge.
     """
     problem = _in_datum(survey, datum, over, photo)
     return _adjusted(
@@ -44,29 +53,43 @@ def adjust(survey, *, datum="control", over=None, photo=None, tolerance=1e-4, ma
 
 
 def predict(survey, *, datum="control", over=None, photo=None):
-    """What `adjust` would give, before anything is measured: an Adjusted at the start values.
+    """Predict the result of `adjust` before the measurement.
 
-    The derivatives are taken at the start values of the Survey and no step is made, so the values
-    of its observations do not matter; arguments and errors are those of `adjust`. Residuals and
-    sigma0 mean nothing, covariances, redundancy numbers and minimal detectable biases do.
+    Derivatives are taken at the start values without a step, so observed values do not matter.
+    Covariances, redundancy numbers and minimal detectable biases are valid; residuals and sigma0
+    have no meaning. Arguments and errors are those of `adjust`.
+
+    Parameters
+    ----------
+    survey : Survey
+    datum, over, photo
+        See `adjust`.
+
+    Returns
+    -------
+    Adjusted
     """
     problem = _in_datum(survey, datum, over, photo)
     return _adjusted(survey, problem, datum, lambda: linearise(problem.model, problem.state))
 
 
 def _in_datum(survey, datum, over, photo):
-    """The Problem of a survey, with inner constraints where they are asked for and needed."""
+    """The Problem of a survey, with inner constraints where requested and needed."""
     problem = assemble(survey)
     if datum == "inner":
         free = null_space(problem)
         return add_inner_constraints(problem, over, free, photo) if free.shape[1] else problem
-    if any(isinstance(one, PlumbLines) for one in survey.observations):
-        _refuse_defect(problem)  # a plumb line that is not quite plumb would hide one
+    if any(
+        isinstance(observations_of_table, PlumbLines)
+        for observations_of_table in survey.observations
+    ):
+        # A plumb line that is not exactly vertical would hide a datum defect from the solver.
+        _refuse_defect(problem)
     return problem
 
 
 def _adjusted(survey, problem, datum, solved):
-    """The Adjusted of a problem that `solved` solves; what cannot be solved is told in words."""
+    """The Adjusted of a Problem solved by `solved`; failures are explained in words."""
     try:
         solution = solved()
     except UndeterminedError:
@@ -83,6 +106,7 @@ def _adjusted(survey, problem, datum, solved):
         raise SolutionError(text) from error
     if survey.photos is not None:
         refuse_worthless_cameras(survey, problem, solution)
+    # Averaged readings count as if adjusted one by one: add their scatter about the means.
     chi2, dof = _scatter_of_repeats(problem)
     if dof:
         solution = replace(solution, chi2=solution.chi2 + chi2, rows=solution.rows + dof)
@@ -91,15 +115,17 @@ def _adjusted(survey, problem, datum, solved):
 
 def _scatter_of_repeats(problem):
     """Chi-square of repeated readings about their means, and its degrees of freedom."""
-    found = np.zeros(2)
-    for one in problem.observations:
-        if one.trace is not None:
-            found += [one.in_use @ part for part in one.trace.repeated]
-    return float(found[0]), round(found[1])
+    total = np.zeros(2)
+    for observations_of_group in problem.observations:
+        if observations_of_group.trace is not None:
+            total += [
+                observations_of_group.in_use @ part for part in observations_of_group.trace.repeated
+            ]
+    return float(total[0]), round(total[1])
 
 
 def _refuse_defect(problem):
-    """Raise when the datum is missing, in words."""
+    """Raise SolutionError, in words, if the datum has a defect."""
     free = null_space(problem)
     if free.shape[1]:
         raise SolutionError(datum_defect_sentence(free, problem))

@@ -1,4 +1,4 @@
-"""From a survey to a least-squares problem: what is unknown, and in which column it stands."""
+"""Assembly of the least squares problem of a survey: unknowns and their columns."""
 
 from dataclasses import dataclass
 
@@ -29,9 +29,16 @@ from tankcal.survey.observations import (
 class Held:
     """Observations that hold exactly (sd 0).
 
-    observations  as the survey has them (relative to the centre)
-    conditions    the same as conditions      row_of  (conditions,) number of each one's observation
-    source, rows  see Problem
+    Attributes
+    ----------
+    observations : Observations
+        As in the survey, relative to the centre.
+    conditions : Observations
+        The same observations as conditions.
+    row_of : ndarray of int, shape (conditions,)
+        Number of the observation of each condition.
+    source, rows
+        See Problem.
     """
 
     observations: object
@@ -43,22 +50,35 @@ class Held:
 
 @dataclass(frozen=True)
 class Problem:
-    """A survey ready to be adjusted; coordinates relative to `centre_m`.
+    """A survey ready for adjustment; coordinates are relative to `centre_m`.
 
-    model, state, layout   for the solver
-    observations           tuple, one for each group of the model
-    sources                for each group where it comes from: "image points", a number in
-                           Survey.observations, or "known beforehand"
-    rows_of                for each group its rows' numbers there
-    set_aside              (points,) why a point does not take part; empty string: it does
-    eliminated             (points,) True when a point is eliminated
-    interior_of            (photos, 13) place of each photo's parameters in State.interior
-    exact                  tuple of Held: observations that hold exactly
-    points                 names
-    ordinary               number of groups before those of correlated observations; their tables of
-                           residuals come first as well
-    blocks                 pairs (number of a group of correlated observations, Members); these come
-                           last; None for the number where all of a block is set aside
+    Attributes
+    ----------
+    model, state, layout
+        Input of the solver.
+    observations : tuple
+        One for each group of the model.
+    sources : tuple
+        Source of each group: "image points", a number in Survey.observations, or "known
+        beforehand".
+    rows_of : tuple
+        Row numbers of each group in its source.
+    centre_m : ndarray, shape (3,)
+    set_aside : tuple, length points
+        Reason why a point is not adjusted; empty if it is.
+    eliminated : ndarray of bool, shape (points,)
+        True for points eliminated from the normal equations.
+    interior_of : ndarray of int, shape (photos, 13)
+        Indices of the parameters of each photo in State.interior.
+    exact : tuple of Held
+        Observations that hold exactly.
+    points, photos : tuple
+        Names.
+    ordinary : int
+        Number of groups before the groups of correlated observations.
+    blocks : tuple
+        Pairs (number of a group of correlated observations, Members), the last groups; the number
+        is None if the whole block is rejected.
     """
 
     model: Model
@@ -79,48 +99,66 @@ class Problem:
 
     @property
     def aside(self):
-        """(points,) True for those that do not take part."""
-        return _are_told(self.set_aside)
+        """Mask (points,) of points that are not adjusted."""
+        return _are_nonempty(self.set_aside)
 
     def name_of_point(self, point):
         """Name of a point."""
         return self.points[point]
 
     def relative(self, observations):
-        """Observations in the survey's frame, as the model has them."""
+        """Convert observations from the frame of the survey to coordinates relative to the
+        centre."""
         return observations.relative(self.centre_m)
 
 
 def assemble(survey):
-    """The Problem of a Survey; raises SolutionError when something cannot be determined."""
+    """Assemble the Problem of a survey.
+
+    Parameters
+    ----------
+    survey : Survey
+
+    Returns
+    -------
+    Problem
+
+    Raises
+    ------
+    SolutionError
+        If unknowns cannot be determined.
+    """
     set_aside = _set_aside(survey)
-    used = ~_are_told(set_aside)
+    is_used = ~_are_nonempty(set_aside)
     centre = _centre(survey)
     table, values, interior_free, known = _interior(survey)
-    groups, sources, rows_of, exact = _others(survey, used, centre)
-    eliminated = eliminated_points(survey, groups, used, exact)
+    groups, sources, rows_of, exact = _other_groups(survey, is_used, centre)
+    eliminated = eliminated_points(survey, groups, is_used, exact)
+    # A block may connect points, so none of its points is eliminated.
     for block in survey.correlated:
         for source in np.unique(block.source):
-            one = survey.observations[source]
-            for name in one.ties:
-                eliminated[getattr(one, name)[block.row[block.source == source]]] = False
-    layout, reduced = layout_of(survey, eliminated, used, interior_free, table)
-    for one, rows in _image_groups(survey, used, layout, reduced, table):
-        groups.append(one)
+            group = survey.observations[source]
+            for name in group.ties:
+                eliminated[getattr(group, name)[block.row[block.source == source]]] = False
+    layout, reduced = layout_of(survey, eliminated, is_used, interior_free, table)
+    for group, rows in _image_groups(survey, is_used, layout, reduced, table):
+        groups.append(group)
         sources.append(IMAGES)
         rows_of.append(rows)
-    for one in known + _known_nuisances(survey):
-        groups.append(one)
+    for group in known + _known_nuisances(survey):
+        groups.append(group)
         sources.append("known beforehand")
-        rows_of.append(np.arange(len(one)))
+        rows_of.append(np.arange(len(group)))
+    # Observations and state use the same centre, which keeps rounding small.
     state = _state(survey, centre, values)
     ordinary, blocks = len(groups), []
-    for one, members in correlated_groups(survey, used, centre, state):
-        blocks.append((None if one is None else len(groups), members))
-        if one is not None:
-            groups.append(one)
+    for group, members in correlated_groups(survey, is_used, centre, state):
+        blocks.append((None if group is None else len(groups), members))
+        if group is not None:
+            groups.append(group)
             sources.append(CORRELATED)
             rows_of.append(np.zeros(1, dtype=int))
+    # Derivatives must exist at the start values.
     _refuse_coincident(survey, groups, state)
     model = Model(
         reduced=reduced,
@@ -141,29 +179,31 @@ def assemble(survey):
 
 
 def _refuse_coincident(survey, groups, state):
-    """Raise when a sight starts with both its ends at one place: it has no derivatives there."""
-    for one in groups:
-        bad = one.without_derivatives(state)
+    """Raise SolutionError if both ends of a sight start at the same place, where it has no
+    derivatives."""
+    for observations in groups:
+        bad = observations.without_derivatives(state)
         if bad.any():
             raise SolutionError(
                 message(
                     "ends_coincide",
                     "both ends of {observation} have the same approximate place: the "
                     "points have too few observations, or one point has two names",
-                    observation=told(survey, one, int(np.argmax(bad))),
+                    observation=told(survey, observations, int(np.argmax(bad))),
                 )
             )
 
 
 def _groups(observations, layout):
+    """Solver groups of observations."""
     return tuple(
-        Group(one.columns(layout).astype(np.int32, copy=False), one.rows, one.fill, one.part)
-        for one in observations
+        Group(item.columns(layout).astype(np.int32, copy=False), item.rows, item.fill, item.part)
+        for item in observations
     )
 
 
 def _set_aside(survey):
-    """For each point, why it cannot be determined; an empty string when it can."""
+    """Reason for each point why it cannot be determined; empty if it can."""
     images = survey.image_points
     if images is not None:
         _refuse_poor_photos(survey)
@@ -177,72 +217,89 @@ def _set_aside(survey):
     return tuple(_poor(name, count) if is_bad else "" for name, count, is_bad in names)
 
 
-def _are_told(texts):
-    """(n,) True where a text is not empty."""
-    if not any(texts):  # of many points, in no time
+def _are_nonempty(texts):
+    """Mask (n,) of texts that are not empty."""
+    if not any(texts):  # fast path for surveys of many points
         return np.zeros(len(texts), dtype=bool)
     return np.array([bool(text) for text in texts])
 
 
 def _poor(name, rays):
+    """Reason for a point with too few observations."""
     if rays == 1:
         return one_ray_sentence(name)
     return message("hardly_observed", "point {point} has too few observations", point=name)
 
 
 def one_ray_sentence(name):
-    """What is said of a point that one image alone shows."""
+    """Sentence about a point shown by one image only."""
     return message("one_ray", "point {point} has only one ray", point=name)
 
 
 def _refuse_poor_photos(survey):
-    """Raise when a photo has fewer observations than unknowns."""
+    """Raise SolutionError if a photo has fewer observations than unknowns."""
     images, photos = survey.image_points, survey.photos
     rays = np.bincount(images.of_used("photo"), minlength=len(photos.names))
     count = 2 * rays
-    for one in survey.observations:
-        if hasattr(one, "photo"):
-            count += one.rows * np.bincount(one.photo, minlength=len(count))
+    for item in survey.observations:
+        if hasattr(item, "photo"):
+            count += item.rows * np.bincount(item.photo, minlength=len(count))
     if photos.fixed is not None:
         count += np.repeat(photos.fixed, (1, 1, 1, 3), axis=1).sum(axis=1)
+    # A photo has six unknowns of exterior orientation.
     poor = (count < 6).nonzero()[0]
     if len(poor):
-        told = ", ".join(f"{photos.names[i]} ({rays[i]})" for i in poor)
+        photos_in_words = ", ".join(f"{photos.names[i]} ({rays[i]})" for i in poor)
         raise SolutionError(
             message(
                 "photo_short_of_points",
                 "a photo needs at least 3 image points: {photos}",
-                photos=told,
+                photos=photos_in_words,
             )
         )
 
 
-def _others(survey, used, centre):
-    """Observations other than image points, relative to the centre, between points that are used.
+def _other_groups(survey, is_used, centre):
+    """Collect observations other than image points, between adjusted points.
 
-    Returns the observations, their numbers in the survey, the numbers of their rows, and a tuple of
-    Held for those that hold exactly.
+    Parameters
+    ----------
+    survey : Survey
+    used : ndarray of bool, shape (points,)
+    centre : ndarray, shape (3,)
+
+    Returns
+    -------
+    groups : list of Observations
+        Relative to the centre.
+    sources : list of int
+        Numbers in the survey.
+    rows_of : list of ndarray
+        Row numbers.
+    exact : tuple of Held
+        Observations that hold exactly.
     """
     groups, sources, rows_of, exact = [], [], [], []
-    for number, one in enumerate(survey.observations):
-        keep = np.ones(len(one), dtype=bool)
-        for name in one.ties:
-            keep &= used[getattr(one, name)]
-        holds = one.exact
-        if holds.any() and (sharp := (keep & holds & one.in_use).nonzero()[0]).size:
-            taken = one.taken(sharp).relative(centre)
+    for number, table in enumerate(survey.observations):
+        keep = np.ones(len(table), dtype=bool)
+        for name in table.ties:
+            keep &= is_used[getattr(table, name)]
+        holds = table.exact
+        # Exact observations become conditions of the solver; a weight 1/0 would be infinite.
+        if holds.any() and (sharp := (keep & holds & table.in_use).nonzero()[0]).size:
+            taken = table.taken(sharp).relative(centre)
             exact.append(Held(taken, *taken.conditions(), number, sharp))
             if holds.all():
                 continue
         rows = (keep & ~holds & ~is_in_block(survey, number)).nonzero()[0]
-        groups.append((one if len(rows) == len(one) else one.taken(rows)).relative(centre))
+        groups.append((table if len(rows) == len(table) else table.taken(rows)).relative(centre))
         sources.append(number)
         rows_of.append(rows)
     return groups, sources, rows_of, tuple(exact)
 
 
 def _centre(survey):
-    """Middle of the start coordinates: where the adjustment puts its origin."""
+    """Mean of the start coordinates, the origin of the adjustment."""
     known = np.isfinite(survey.xyz_m)
     if not known.all():
         missing = [survey.points[i] for i in np.flatnonzero(~known.all(axis=1))[:5]]
@@ -257,18 +314,31 @@ def _centre(survey):
 
 
 def _interior(survey):
-    """Where each photo's interior parameters stand, their values, and which are unknowns.
+    """Interior parameters of the photos.
 
-    Returns table (photos, 13), values (q + 1,), free (q + 1,), and observations of weighted ones.
+    Parameters
+    ----------
+    survey : Survey
+
+    Returns
+    -------
+    table : ndarray of int, shape (photos, 13)
+        Index of each parameter in `values`.
+    values : ndarray, shape (q + 1,)
+        The last value is 0, for omitted parameters.
+    free : ndarray of bool, shape (q + 1,)
+        True for unknowns.
+    observed : list of KnownUnknowns
+        Weighted parameters.
     """
     photos = survey.photos
     if photos is None:
         return np.zeros((0, 13), dtype=int), np.zeros(1), np.zeros(1, dtype=bool), []
     table = np.full((len(photos.names), 13), -1)
-    values, free, known, shared = [], [], [], {}
+    values, free, weighted, shared = [], [], [], {}
     for camera, settings in enumerate(survey.cameras):
-        mine = (photos.camera == camera).nonzero()[0]
-        if not len(mine):
+        photos_of_camera = (photos.camera == camera).nonzero()[0]
+        if not len(photos_of_camera):
             continue
         if settings.scope[0] == "off" or not settings.values[0] > 0:
             raise SolutionError(
@@ -278,41 +348,53 @@ def _interior(survey):
                     camera=settings.name,
                 )
             )
-        wanted = [[k for k in range(13) if settings.scope[k] == scope] for scope in SCOPES]
-        each = [(shared, mine, wanted[1]), ({}, mine, wanted[2])]
-        each += [({}, [photo], wanted[3]) for photo in mine] if wanted[3] else []
-        for place, group, numbers in each:
+        numbers_of_scope = [
+            [k for k in range(13) if settings.scope[k] == scope] for scope in SCOPES
+        ]
+        assignments = [
+            (shared, photos_of_camera, numbers_of_scope[1]),
+            ({}, photos_of_camera, numbers_of_scope[2]),
+        ]
+        assignments += (
+            [({}, [photo], numbers_of_scope[3]) for photo in photos_of_camera]
+            if numbers_of_scope[3]
+            else []
+        )
+        for place, group, numbers in assignments:
             for k in numbers:
                 if k not in place:
+                    # A parameter shared by photos has one index; its place depends on the scope.
                     place[k] = len(values)
                     values.append(settings.values[k])
                     free.append(settings.state[k] != "fixed")
                     if settings.state[k] == "weighted":
-                        known.append((place[k], values[-1], settings.sd[k]))
+                        weighted.append((place[k], values[-1], settings.sd[k]))
                 table[group, k] = place[k]
+    # Omitted parameters point to the last value, 0.
     table[table < 0] = len(values)
     observed = []
-    if known:
-        index, value, sd = np.array(known).T
+    if weighted:
+        index, value, sd = np.array(weighted).T
         observed = [KnownUnknowns(value, sd, "interior", index.astype(int))]
     return table, np.array([*values, 0.0]), np.array([*free, False]), observed
 
 
 def _known_nuisances(survey):
-    """Scales and offsets of instruments with an sd: weighted unknowns."""
+    """Observations of weighted scales and offsets of instruments."""
     observed = []
-    for of, one in survey.nuisances.items():
-        index = (one.sd > 0).nonzero()[0]
+    for name, shared in survey.nuisances.items():
+        index = (shared.sd > 0).nonzero()[0]
         if len(index):
-            observed.append(KnownUnknowns(one.value[index], one.sd[index], of, index))
+            observed.append(KnownUnknowns(shared.value[index], shared.sd[index], name, index))
     return observed
 
 
-def _image_groups(survey, used, layout, reduced, table):
-    """Image coordinates by form of camera, those of eliminated points first and point by point.
+def _image_groups(survey, is_used, layout, reduced, table):
+    """Yield image coordinates by form of camera, those of eliminated points first and point by
+    point.
 
-    Of so many as are evaluated together those of a photo stand next to one another: their rows
-    have the same columns, and squares of all of them are one product.
+    Within each part that is evaluated together, the image points of a photo are adjacent: their
+    rows have the same columns, so that one product forms all their squares.
     """
     images = survey.image_points
     if images is None or not len(images):
@@ -327,34 +409,42 @@ def _image_groups(survey, used, layout, reduced, table):
     first = layout.points[:, 0]
     last = np.count_nonzero(first >= reduced)
     of_point = np.where(first < reduced, last, (first - reduced) // 3)
-    key = of_point.astype(np.min_scalar_type(last)).take(images.point)  # sorted faster
+    key = of_point.astype(np.min_scalar_type(last)).take(images.point)  # small integers sort faster
     for form, order in survey.by_form(images):
-        left = table[[survey.cameras[camera].form == form for camera in survey.photos.camera]]
-        if not used.all():
-            order = order[used[images.point[order]]]
+        table_of_form = table[
+            [survey.cameras[camera].form == form for camera in survey.photos.camera]
+        ]
+        if not is_used.all():
+            order = order[is_used[images.point[order]]]
         of_order = key[order]
         if (of_order[1:] < of_order[:-1]).any():
             order = order[of_order.argsort(kind="stable")]
         eliminated = np.count_nonzero(key[order] < last)
+        # Eliminated and reduced points must not share a part.
         part = np.minimum(np.arange(len(order)), eliminated) // PART
         part[eliminated:] += 1
         of_photo = part * len(survey.photos.names) + images.photo[order]
         of_photo = of_photo.astype(np.min_scalar_type(of_photo.max(initial=0)))
         order = order[of_photo.argsort(kind="stable")]
-        active = (left < layout.interior.size - 1).any(axis=0).nonzero()[0]
-        active = active[(layout.interior[left[:, active]] >= 0).any(axis=0)]
+        active = (table_of_form < layout.interior.size - 1).any(axis=0).nonzero()[0]
+        active = active[(layout.interior[table_of_form[:, active]] >= 0).any(axis=0)]
         yield images.taken(order, form=form, active=active, interior_of=table), order
 
 
 def _state(survey, centre, values):
+    """Start values of all unknowns, relative to the centre."""
     photos, systems = survey.photos, survey.systems
-    found = {"nuisance": {of: one.value for of, one in survey.nuisances.items()}}
+    values_of_state = {
+        "nuisance": {name: shared.value for name, shared in survey.nuisances.items()}
+    }
     if photos is not None:
-        found |= {"photo_xyz_m": photos.xyz_m - centre, "rotation": photos.rotation}
+        values_of_state |= {"photo_xyz_m": photos.xyz_m - centre, "rotation": photos.rotation}
     if systems:
         rotation = np.array([system.rotation for system in systems])
         scale = np.array([system.scale for system in systems])
         shift = np.array([system.shift_m for system in systems])
+        # The shift of the centre enters the transformation: X_system = (1 + m) R (x + centre) +
+        # shift.
         shift = shift + (1 + scale)[:, None] * (rotation @ centre)
-        found |= {"system": rotation, "system_shift_m": shift, "system_scale": scale}
-    return State(xyz_m=survey.xyz_m - centre, interior=values, **found)
+        values_of_state |= {"system": rotation, "system_shift_m": shift, "system_scale": scale}
+    return State(xyz_m=survey.xyz_m - centre, interior=values, **values_of_state)

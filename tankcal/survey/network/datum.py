@@ -1,9 +1,9 @@
-"""The seven ways in which a whole survey can move, and which of them nothing observes.
+"""The seven motions of a survey (six rigid motions and scale), and those that no observation
+determines.
 
 Translations, rotations about the axes through the centre, and scale move points, projection
-centres, directions of circles and further systems together, so that no image, angle or ratio of
-distances changes. Source: Koch 1999, Parameter Estimation and Hypothesis Testing, section 3.3;
-Meissl 1969.
+centres, circle orientations and further systems together. No image, angle or ratio of distances
+changes. Source: Koch 1999, Parameter Estimation and Hypothesis Testing, section 3.3; Meissl 1969.
 """
 
 from dataclasses import replace
@@ -16,19 +16,21 @@ from tankcal.survey.observations.nuisance import NUISANCES
 SHIFTS, TURNS = ("x", "y", "z"), ("X", "Y", "Z")
 THREE_TURNS = message("rotations", "three rotations")
 SCALE = message("scale", "the scale")
-UNFELT = 1e-8  # change of the whitened rows, with all columns scaled to length one
-DEPENDS, TINY = 1e-6, 1e-12  # change of a quantity over the sum of its parts' changes; m or rad
-NAMED = 4  # points and photos in a sentence
-AS_IF_FIXED = 1e4  # weight of a fixed unknown among the rows, as if it were known to 0.1 mm
+# largest change of the whitened rows by an undetermined motion, columns scaled to length one
+UNFELT = 1e-8
+# relative change of a quantity that depends on the datum; smallest change, m or rad
+DEPENDS, TINY = 1e-6, 1e-12
+NAMED = 4  # points and photos listed in a sentence
+AS_IF_FIXED = 1e4  # weight of a fixed unknown as a row: as if known to 0.1 mm
 
 
 def directions(layout, state):
-    """The seven directions (unknowns, 7) at a state; fixed unknowns are left out."""
+    """The seven directions (unknowns, 7) at a state; fixed unknowns are omitted."""
     return _together(layout, _parts(layout, state))[:-1]
 
 
 def _together(layout, parts):
-    """The seven directions of parts, and a row of zeros for what is left out: (unknowns + 1, 7)."""
+    """Directions (unknowns + 1, 7) from parts, with a final row of zeros for fixed unknowns."""
     whole = np.zeros((layout.unknowns + 1, 7))
     for columns, derivative in parts:
         whole[columns.ravel()] = derivative.reshape(-1, 7)
@@ -37,7 +39,7 @@ def _together(layout, parts):
 
 
 def _parts(layout, state):
-    """Columns (...) of each kind of unknown with their derivatives (..., 7)."""
+    """Yield columns (...) of each kind of unknown with their derivatives (..., 7)."""
     derivatives = _derivatives(state)
     for name in ("points", "photos"):
         yield getattr(layout, name), derivatives[name]
@@ -47,11 +49,13 @@ def _parts(layout, state):
 
 
 def _derivatives(state):
-    """{name: derivatives (..., 7)} by the seven ways of what they move."""
+    """{name: derivatives (..., 7)} of the unknowns by the seven motions."""
     n = len(state.photo_xyz_m)
     photos = np.zeros((n, 6, 7))
     if n:
-        photos[:, :3] = _of_places(state.photo_xyz_m)
+        photos[:, :3] = _derivatives_of_places(state.photo_xyz_m)
+        # Photo rotations turn with the frame; the sign follows from the small rotation acting on
+        # the left.
         photos[:, 3:, 3:6] = -state.rotation
     systems = np.zeros((len(state.system), 7, 7))
     if len(systems):
@@ -59,12 +63,18 @@ def _derivatives(state):
         systems[:, :3, 3:6] = -state.system
         systems[:, 3:6, :3] = -m[:, None, None] * state.system
         systems[:, 6, 6] = -m
-    shared = {of: NUISANCES[of].ways(value) for of, value in state.nuisance.items()}
-    return {"points": _of_places(state.xyz_m), "photos": photos, **shared, "system": systems}
+    shared = {name: NUISANCES[name].ways(value) for name, value in state.nuisance.items()}
+    return {
+        "points": _derivatives_of_places(state.xyz_m),
+        "photos": photos,
+        **shared,
+        "system": systems,
+    }
 
 
-def _of_places(xyz):
-    """Derivatives (n, 3, 7) of places by the seven ways."""
+def _derivatives_of_places(xyz):
+    """Derivatives (n, 3, 7) of positions by the seven motions: identity, cross product,
+    position."""
     x, y, z = xyz.T
     out = np.zeros((len(xyz), 3, 7))
     out[:, :, :3] = np.eye(3)
@@ -76,37 +86,54 @@ def _of_places(xyz):
 
 
 def null_space(problem, unfelt=UNFELT, fixed=True, state=None, count=None):
-    """Combinations (7, d) of the seven ways that neither observations nor fixed unknowns feel.
+    """Combinations (7, d) of the seven motions that neither observations nor fixed unknowns
+    determine.
 
-    unfelt  see UNFELT      fixed  False: as if only observations held anything
-    state   where they are asked for, None: the start      count  d, None: all below `unfelt`
+    Parameters
+    ----------
+    problem : Problem
+    unfelt : float
+        See UNFELT.
+    fixed : bool
+        False: fixed unknowns do not count.
+    state : State, optional
+        Point of linearization; default: the start values.
+    count : int, optional
+        Value of d; default: all combinations below `unfelt`.
+
+    Returns
+    -------
+    ndarray, shape (7, d)
     """
     layout, state = problem.layout, problem.state if state is None else state
     idle = _idle(problem)
     parts = [*_parts(layout, state)]
     whole = _together(layout, parts)
     felt, lengths = [np.zeros((1, 7))], np.zeros(len(whole))
-    for one, weight in _feeling(problem):
-        columns = one.columns(layout)
-        w = np.empty((len(one), one.rows))
-        jac = np.empty((len(one), one.rows, columns.shape[1]))
-        undisturbed = one.undisturbed(state)
-        one.fill(undisturbed, w, jac)
+    for observations, weight in _feeling(problem):
+        columns = observations.columns(layout)
+        w = np.empty((len(observations), observations.rows))
+        jac = np.empty((len(observations), observations.rows, columns.shape[1]))
+        undisturbed = observations.undisturbed(state)
+        observations.fill(undisturbed, w, jac)
         jac *= weight
         ways = whole
         if undisturbed is not state:
             ways = _together(layout, _parts(layout, undisturbed))
         moved = np.einsum("nmk,nkd->nmd", jac, ways[columns]).reshape(-1, 7)
+        # The triangular factor keeps the singular values of the rows, at size 7 x 7.
         felt.append(np.linalg.qr(moved, mode="r"))
         np.add.at(lengths, columns, np.einsum("nmk,nmk->nk", jac, jac))
     square = np.einsum("ud,ud,u->d", whole, whole, lengths)
     for columns, derivative in parts:
         holds = (columns < 0) & np.logical_not(idle.get(id(columns), False))
+        # A fixed unknown resists a motion like a very accurate observation.
         sharp = AS_IF_FIXED * derivative[holds].reshape(-1, 7)
         if fixed and sharp.any():
             felt.append(np.linalg.qr(sharp, mode="r"))
             square += np.sum(sharp**2, axis=0)
     moving = (square > 0) | whole.any(axis=0)  # heights alone do not define the azimuth
+    # Scaling makes translations, rotations and scale comparable.
     size = np.sqrt(np.where(square > 0, square, 1.0))[moving]
     _, singular, vectors = np.linalg.svd(np.vstack(felt)[:, moving] / size)
     rank = len(size) - count if count is not None else int(np.sum(singular > unfelt))
@@ -116,37 +143,41 @@ def null_space(problem, unfelt=UNFELT, fixed=True, state=None, count=None):
 
 
 def _feeling(problem):
-    """Observations that may feel the datum, each with what its rows are multiplied by."""
-    yield from ((one, 1.0) for one in problem.observations if one.feels_datum)
+    """Yield observations that may determine the datum, with the factor of their rows."""
+    yield from ((group, 1.0) for group in problem.observations if group.feels_datum)
     yield from ((held.conditions, AS_IF_FIXED) for held in problem.exact)
 
 
 def _idle(problem):
-    """{id of columns: mask} of the unknowns that have no column because nobody observed them."""
+    """{id of columns: mask} of the unknowns without a column because they were not observed."""
     layout = problem.layout
-    unused = {of: np.ones(len(columns), dtype=bool) for of, columns in layout.nuisance.items()}
-    for one, _ in _feeling(problem):
-        for of, field in one.nuisances:
-            number = getattr(one, field)
-            unused[of][number[number >= 0]] = False
-    idle = {id(layout.nuisance[of]): rows for of, rows in unused.items()}
+    unused = {name: np.ones(len(columns), dtype=bool) for name, columns in layout.nuisance.items()}
+    for observations, _ in _feeling(problem):
+        for name, field in observations.nuisances:
+            number = getattr(observations, field)
+            unused[name][number[number >= 0]] = False
+    idle = {id(layout.nuisance[name]): rows for name, rows in unused.items()}
     return {id(layout.points): problem.aside[:, None], **idle}
 
 
 def depends_on_datum(adjusted, quantities, fixed=False):
-    """Which quantities depend on the choice of the datum: (n,) True for those that do.
+    """Determine which quantities depend on the choice of the datum.
 
-    A quantity depends on it when a motion or scaling of the whole survey that no observation feels
-    would change it. Distances do when nothing gives the scale, heights and coordinates nearly
+    A quantity depends on it if an undetermined motion or scaling of the survey changes the
+    quantity. Distances depend on it without an observed scale, heights and coordinates nearly
     always, shapes never.
 
     Parameters
     ----------
-    quantities : tankcal.survey.observations
-        Between points of the survey; values and sds
-        do not matter.
-    fixed : optional
-        True: coordinates and photos held fixed count as known, not as a choice.
+    adjusted : Adjusted
+    quantities : Observations
+        Between points of the survey; values and sds do not matter.
+    fixed : bool
+        True: fixed coordinates and photos count as known, not as a choice.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
     """
     problem, state = adjusted.problem, adjusted.solution.unknowns
     free = null_space(problem, fixed=fixed)
@@ -158,20 +189,21 @@ def depends_on_datum(adjusted, quantities, fixed=False):
         parts[name] = first + np.arange(count).reshape(derivative.shape[:-1])
         whole.append(derivative.reshape(count, 7))
         first += count
-    one = problem.relative(quantities)
+    relative_quantities = problem.relative(quantities)
     nuisance = {of: parts.pop(of) for of in state.nuisance}
     interior = np.full_like(problem.layout.interior, -1)
     layout = replace(problem.layout, **parts, nuisance=nuisance, interior=interior)
     ways = np.vstack([*whole, np.zeros((1, 7))]) @ free
-    _, derivatives = one.computed(state, True)
-    columns = one.columns(layout)
+    _, derivatives = relative_quantities.computed(state, True)
+    columns = relative_quantities.columns(layout)
+    # A change far below the sum of its parts is rounding.
     change = np.einsum("nmk,nkd->nmd", derivatives, ways[columns])
     size = np.einsum("nmk,nkd->nmd", np.abs(derivatives), np.abs(ways[columns]))
     return (np.abs(change) > DEPENDS * np.maximum(size, TINY)).any(axis=(1, 2))
 
 
 def datum_defect_sentence(combinations, problem=None):
-    """The datum defect in words, and what helps; see `defect_in_words`."""
+    """Sentence with the datum defect and a remedy; see `defect_in_words`."""
     defect = defect_in_words(combinations, problem)
     return message(
         "defect_and_help", "{defect}; add control or choose datum = inner", defect=defect
@@ -179,16 +211,22 @@ def datum_defect_sentence(combinations, problem=None):
 
 
 def defect_in_words(combinations, problem=None):
-    """The datum defect in words, from combinations (7, d) of the seven ways: a Message.
+    """Describe a datum defect in words.
 
     Parameters
     ----------
-    problem : optional
-        To name the points that a single rotation leaves in place, or None.
+    combinations : ndarray, shape (7, d)
+    problem : Problem, optional
+        Supplies the names of points that a single rotation leaves in place.
+
+    Returns
+    -------
+    Message
     """
     d = combinations.shape[1]
     basis = np.linalg.qr(combinations)[0]
     share = np.sum(basis**2, axis=1)
+    # Rows of an orthonormal basis show the share of each motion in the null space.
     pure = [i for i in range(7) if share[i] > 1 - 1e-6]
     parts = _ways(pure)
     if len(pure) < d:
@@ -196,34 +234,39 @@ def defect_in_words(combinations, problem=None):
         about = None if problem is None else _about_what_stays(combinations, problem)
         parts.append(about or _mixture(d - len(pure), _ways(mixed)))
     if d == 1:
-        one = "datum defect 1: {what} is not determined by any observation"
-        return message("datum_defect_one", one, what=join_with_and(parts))
+        single = "datum defect 1: {what} is not determined by any observation"
+        return message("datum_defect_one", single, what=join_with_and(parts))
     several = "datum defect {defect}: {what} are not determined by any observation"
     return message("datum_defect", several, defect=d, what=join_with_and(parts))
 
 
 def _ways(numbers):
-    """What each of some of the seven ways is called; three of a kind are one."""
+    """Names of some of the seven motions; three of a kind are named together."""
     shifts = [SHIFTS[i] for i in numbers if i < 3]
     turns = [TURNS[i - 3] for i in numbers if 3 <= i < 6]
-    found = [message("translation", "the translation in {axis}", axis=one) for one in shifts]
+    names = [
+        message("translation", "the translation in {axis}", axis=axis_name) for axis_name in shifts
+    ]
     if len(shifts) == 3:
-        found = [message("translations", "three translations")]
+        names = [message("translations", "three translations")]
     if len(turns) == 3:
-        found.append(THREE_TURNS)
+        names.append(THREE_TURNS)
     else:
-        found += [message("rotation", "the rotation about {axis}", axis=one) for one in turns]
-    return found + [SCALE] * (6 in numbers)
+        names += [
+            message("rotation", "the rotation about {axis}", axis=axis_name) for axis_name in turns
+        ]
+    return names + [SCALE] * (6 in numbers)
 
 
 def _mixture(count, ways):
+    """A combination of motions, in words."""
     if count == 1:
         return message("combination", "a combination of {ways}", ways=ways)
     return message("combinations", "{count} combinations of {ways}", count=count, ways=ways)
 
 
 def _about_what_stays(combinations, problem):
-    """What turns and stretches about what keeps its place, None when nothing does."""
+    """Rotations and scale about fixed positions, in words; None if no position stays."""
     turns, stretches = (
         np.linalg.matrix_rank(combinations[rows], tol=1e-6 * np.abs(combinations[rows]).max())
         if np.abs(combinations[rows]).max() > 1e-9 * np.abs(combinations).max()
@@ -247,40 +290,45 @@ def _about_what_stays(combinations, problem):
 
 
 def _staying(combinations, problem):
-    """The points and photos that no combination (7, d) moves, in words, and how many."""
-    used = ~_idle(problem)[id(problem.layout.points)][:, 0]
-    xyz = np.vstack([problem.state.xyz_m[used], problem.state.photo_xyz_m])
-    size = np.linalg.norm(_of_places(xyz) @ combinations, axis=(1, 2))
-    points = np.flatnonzero(used)
+    """Points and photos that no combination (7, d) moves, in words, and their number."""
+    is_used = ~_idle(problem)[id(problem.layout.points)][:, 0]
+    xyz = np.vstack([problem.state.xyz_m[is_used], problem.state.photo_xyz_m])
+    size = np.linalg.norm(_derivatives_of_places(xyz) @ combinations, axis=(1, 2))
+    points = np.flatnonzero(is_used)
     still = np.flatnonzero(size < 1e-3 * size.max())
     names = [problem.name_of_point(int(points[i])) for i in still if i < len(points)]
     photos = [problem.photos[i - len(points)] for i in still if i >= len(points)]
-    found = []
+    parts = []
     if names:
-        found.append(_points(names[:NAMED]))
+        parts.append(_points(names[:NAMED]))
     if photos:
-        found.append(message("photos", "photos {photos}", photos=photos[:NAMED]))
-    return join_with_and(found) if found else None, len(still)
+        parts.append(message("photos", "photos {photos}", photos=photos[:NAMED]))
+    return join_with_and(parts) if parts else None, len(still)
 
 
 def _points(names):
+    """Names of points, in words."""
     if len(names) == 1:
         return message("point", "point {point}", point=names[0])
     return message("points", "points {points}", points=names)
 
 
 def add_inner_constraints(problem, over, combinations, photo=None):
-    """The Problem with a datum by inner constraints over chosen points, or over one photo.
+    """Add a datum by inner constraints over points or over one photo.
 
     Parameters
     ----------
-    over : ndarray, shape (k,)
-        Points that take part, or None: all.
+    problem : Problem
+    over : ndarray of int, shape (k,), or None
+        Points of the constraints; None: all.
     combinations : ndarray, shape (7, d)
         From `null_space`.
-    photo : optional
-        Number of the photo that is moved and turned as little as can be, in place of the
-        points; None: the points take part.
+    photo : int, optional
+        Photo whose motion and rotation are minimized, in place of points.
+
+    Returns
+    -------
+    Problem
     """
     layout, mask = problem.layout, np.zeros(problem.model.unknowns + 1)
     if photo is None:
@@ -294,7 +342,8 @@ def add_inner_constraints(problem, over, combinations, photo=None):
     def moves(state):
         ways = combinations
         if d < 7 and state is not problem.state:
-            # what turns about held coordinates turns about where they are now, not at the start
+            # A rotation about held coordinates is about their current positions, not those at the
+            # start.
             ways = null_space(problem, state=state, count=d)
         return directions(layout, state) @ ways
 

@@ -1,4 +1,4 @@
-"""How good the points are: ellipsoids, mean sds, proportional precision, accuracy at check points.
+"""Quality of points: ellipsoids, mean standard deviations, relative precision, check points.
 
 Source: Silva 1995 (5-20); methods of the error ellipsoid: Mikhail & Ackermann 1976, ch. 11.
 """
@@ -12,25 +12,36 @@ from tankcal.solver.effects import variances
 
 
 def ellipsoid_factor(probability, dof=np.inf):
-    """Semi-axes in sds of the ellipsoid that holds a point with a probability (3 dimensions).
+    """Ratio of the semi-axes of a confidence ellipsoid to the standard deviations (3 dimensions).
 
-    sqrt(chi2(p; 3)), or sqrt(3 F(p; 3, dof)) when the variance factor was estimated; 2.50, 2.80,
-    3.37 for 90, 95, 99 %; the standard ellipsoid, factor 1, holds 20 %.
+    sqrt(chi2(p; 3)), or sqrt(3 F(p; 3, dof)) with an estimated variance factor. The factor is 2.50,
+    2.80, 3.37 for 90, 95, 99 %; the standard ellipsoid, factor 1, has a probability of 20 %.
     """
+    # Known variance factor: chi-square; estimated: F distribution.
     if np.isinf(dof):
         return float(np.sqrt(2 * gammaincinv(1.5, probability)))
     return float(np.sqrt(3 * fdtri(3, dof, probability)))
 
 
 def ellipsoids(covariances_m2, probability=0.95, dof=np.inf):
-    """Semi-axes (n, 3), m, largest first, and directions (n, 3, 3), one column for each.
+    """Confidence ellipsoids of points.
 
     Parameters
     ----------
     covariances_m2 : ndarray, shape (n, 3, 3)
-        Of n points, m2.
+    probability : float
+    dof : float
+        Degrees of freedom of the variance factor.
+
+    Returns
+    -------
+    axes : ndarray, shape (n, 3)
+        Semi-axes, m, largest first.
+    directions : ndarray, shape (n, 3, 3)
+        One column for each axis.
     """
     values, vectors = np.linalg.eigh(covariances_m2)
+    # Rounding may give tiny negative eigenvalues.
     axes = np.sqrt(np.maximum(values[:, ::-1], 0.0)) * ellipsoid_factor(probability, dof)
     return axes, vectors[:, :, ::-1]
 
@@ -39,10 +50,20 @@ def ellipsoids(covariances_m2, probability=0.95, dof=np.inf):
 class Precision:
     """Precision of all points together, m.
 
-    mean_sd_m       sqrt(trace / 3n)             axis_sd_m   (3,) the same along x, y, z
-    spherical_sd_m  (n,) (sx + sy + sz) / 3      quadratic_sd_m  (n,) sqrt(sx2 + sy2 + sz2)
-    range_m         (3,) largest minus smallest sd along x, y, z
-    proportional    largest distance of the points over mean_sd_m: precision 1 : this
+    Attributes
+    ----------
+    mean_sd_m : float
+        sqrt(trace / 3n).
+    axis_sd_m : ndarray, shape (3,)
+        Root mean variance along x, y, z.
+    spherical_sd_m : ndarray, shape (n,)
+        (sx + sy + sz) / 3.
+    quadratic_sd_m : ndarray, shape (n,)
+        sqrt(sx2 + sy2 + sz2).
+    range_m : ndarray, shape (3,)
+        Largest minus smallest sd along x, y, z.
+    proportional : float
+        Extent of the points over mean_sd_m: relative precision 1 : proportional.
     """
 
     mean_sd_m: float
@@ -73,9 +94,16 @@ def precision(xyz_m, covariances_m2):
 class Accuracy:
     """Differences at check points, m.
 
-    difference_m  (n, 3) adjusted minus known       r_xyz_m    sqrt(mean of squared magnitudes)
-    largest_m     largest magnitude                 mean_m     mean magnitude
-    normalised    (n, 3) differences in their own sds
+    Attributes
+    ----------
+    difference_m : ndarray, shape (n, 3)
+        Adjusted minus known.
+    r_xyz_m : float
+        Root mean square magnitude.
+    largest_m, mean_m : float
+        Largest and mean magnitude.
+    normalised : ndarray, shape (n, 3)
+        Differences over their standard deviations.
     """
 
     difference_m: np.ndarray
@@ -86,7 +114,19 @@ class Accuracy:
 
 
 def accuracy(adjusted, points, xyz_m, sd_m):
-    """Accuracy of an Adjusted at check points (k,) with known coordinates (k, 3) and sds (k, 3)."""
+    """Compute the Accuracy at check points.
+
+    Parameters
+    ----------
+    adjusted : Adjusted
+    points : ndarray of int, shape (k,)
+    xyz_m, sd_m : ndarray, shape (k, 3)
+        Known coordinates and their standard deviations.
+
+    Returns
+    -------
+    Accuracy
+    """
     difference = adjusted.xyz_m[points] - xyz_m
     size = np.linalg.norm(difference, axis=1)
     variance = np.einsum("nii->ni", adjusted.point_covariances_m2[points]) + np.square(sd_m)
@@ -101,10 +141,16 @@ def accuracy(adjusted, points, xyz_m, sd_m):
 
 @dataclass(frozen=True)
 class Compared:
-    """Observations that were not adjusted, against the adjusted survey.
+    """Observations left out of the adjustment, compared with the adjusted survey.
 
-    difference  (n, m) computed minus observed      sd  (n, m) of it, both sides counted
-    w           (n, m) their ratio; 0 where nothing is uncertain
+    Attributes
+    ----------
+    difference : ndarray, shape (n, m)
+        Computed minus observed.
+    sd : ndarray, shape (n, m)
+        Standard deviation of the difference, both parts included.
+    w : ndarray, shape (n, m)
+        Difference over sd; 0 where the sd is 0.
     """
 
     difference: np.ndarray
@@ -113,19 +159,27 @@ class Compared:
 
 
 def compare_left_out(adjusted, observations):
-    """Compare observations (coordinates relative to the survey's frame) that were left out.
+    """Compare observations left out of the adjustment with the adjusted survey.
 
     Parameters
     ----------
-    observations : tankcal.survey.observations
-        Between points of the adjusted survey.
+    adjusted : Adjusted
+    observations : Observations
+        Between adjusted points, in the frame of the survey.
+
+    Returns
+    -------
+    Compared
     """
     problem, state = adjusted.problem, adjusted.solution.unknowns
-    one = problem.relative(observations)
-    computed, derivatives = one.computed(state, True)
-    variance = np.reshape(np.square(one.sd), computed.shape).astype(float)
-    variance += variances(adjusted.solution.cofactor, one.columns(problem.layout), derivatives)
-    difference = one.difference(computed)
+    relative_observations = problem.relative(observations)
+    computed, derivatives = relative_observations.computed(state, True)
+    variance = np.reshape(np.square(relative_observations.sd), computed.shape).astype(float)
+    # The observation was not adjusted, so it is independent of the adjusted unknowns.
+    variance += variances(
+        adjusted.solution.cofactor, relative_observations.columns(problem.layout), derivatives
+    )
+    difference = relative_observations.difference(computed)
     sd = np.sqrt(variance)
     w = np.divide(difference, sd, out=np.zeros_like(sd), where=sd > 0)
     return Compared(difference, sd, w)
@@ -133,11 +187,18 @@ def compare_left_out(adjusted, observations):
 
 @dataclass(frozen=True)
 class Component:
-    """Is a group of observations as good as declared?
+    """Variance component of a group of observations.
 
-    kind        in words             source      see Residuals
-    redundancy  of the group         factor      sqrt of v'Pv over redundancy: true sd over declared
-    factor_sd   of it, if the declared sd is right: 1 / sqrt(2 redundancy)
+    Attributes
+    ----------
+    kind : str
+    source : object
+        See Residuals.
+    redundancy : float
+    factor : float
+        sqrt of v'Pv over redundancy: estimated over declared standard deviation.
+    factor_sd : float
+        Standard deviation of the factor if the declared sd holds: 1 / sqrt(2 redundancy).
     """
 
     kind: str
@@ -148,15 +209,15 @@ class Component:
 
 
 def components(residuals):
-    """A Component for each group of an adjustment's residuals, one step of Foerstner's estimate."""
-    found = []
+    """Component of each group of residuals: one step of Foerstner's estimate."""
+    estimates = []
     for table in residuals:
         used = np.broadcast_to(table.used[:, None], table.residual.shape)
         redundancy = float(table.redundancy[used].sum())
         if redundancy < 1e-6:
             continue
         square = float(np.sum(table.part_of_chi2[used]))
-        found.append(
+        estimates.append(
             Component(
                 table.kind,
                 table.source,
@@ -165,22 +226,35 @@ def components(residuals):
                 float(1 / np.sqrt(2 * redundancy)),
             )
         )
-    return tuple(found)
+    return tuple(estimates)
 
 
 def estimate_variance_components(survey, adjust, *, rounds=20, tolerance=0.01):
-    """Variance components, iterated: each group's sds times its factor until all factors are 1.
+    """Estimate variance components iteratively.
 
-    survey  Survey                    adjust  function Survey -> Adjusted
+    The standard deviations of each group are multiplied by its factor until all factors are 1.
 
-    Returns the Adjusted and {source: factor} by which the declared sds were multiplied.
+    Parameters
+    ----------
+    survey : Survey
+    adjust : callable
+        adjust(survey) returns an Adjusted.
+    rounds : int
+    tolerance : float
+        Largest difference of a factor from 1 at convergence.
+
+    Returns
+    -------
+    adjusted : Adjusted
+    factors : dict
+        {source: factor} by which the declared standard deviations were multiplied.
     """
     total = {}
     for _ in range(rounds):
         adjusted = adjust(survey)
-        found = [c for c in components(adjusted.residuals) if c.source != "known beforehand"]
+        groups = [c for c in components(adjusted.residuals) if c.source != "known beforehand"]
         merged = {}
-        for c in found:  # several cameras' image points are one group
+        for c in groups:  # image points of several cameras are one group
             square, redundancy = merged.get(c.source, (0.0, 0.0))
             merged[c.source] = (
                 square + c.factor**2 * c.redundancy,
@@ -189,10 +263,11 @@ def estimate_variance_components(survey, adjust, *, rounds=20, tolerance=0.01):
         factors = {
             source: float(np.sqrt(square / redundancy))
             for source, (square, redundancy) in merged.items()
-            if redundancy > 1 and square > 0  # residuals of 0 say nothing of an sd
+            if redundancy > 1 and square > 0  # zero residuals give no estimate
         }
         for source, factor in factors.items():
             total[source] = total.get(source, 1.0) * factor
+        # The factors multiply until the declared standard deviations agree with the residuals.
         if all(abs(factor - 1) < tolerance for factor in factors.values()):
             break
         survey = survey.with_sds(factors)

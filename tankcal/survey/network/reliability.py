@@ -1,16 +1,15 @@
-"""What the residuals say about each observation, and what they would not say.
+"""Reliability of each observation: tests of its residual, and blunders that they would miss.
 
-    w = v / (s sqrt(r))              Baarda's test quantity, sd s known; standard normal
-    tau = w / sigma0                 Pope's, variance factor estimated
-    MDB = delta0 s / sqrt(r)         smallest blunder found with the power asked for
-    delta0 sqrt((1 - r) / r)         its effect on any adjusted quantity, at most, in sds of that
-    Q J' delta0 / sqrt(r)            its effect on the coordinates, J whitened row, Q cofactors
+    w = v / (s sqrt(r))              Baarda's test statistic, sd s known; standard normal
+    tau = w / sigma0                 Pope's test statistic, variance factor estimated
+    MDB = delta0 s / sqrt(r)         smallest blunder detected with the required power
+    delta0 sqrt((1 - r) / r)         largest effect of it on an adjusted quantity, in sds of that
+    Q J' delta0 / sqrt(r)            effect of it on the coordinates, J whitened row, Q cofactors
 
-with the redundancy number r. What holds exactly (sd 0) has no residual; it is tested by the
-reaction of its constraint, the limit of all this for s -> 0: w = k / s_k, MDB = delta0 / s_k, with
-the Lagrange multiplier k.
-Source: Baarda 1968, A testing procedure for use in geodetic networks; Pope 1976, The statistics of
-residuals; Foerstner 1987.
+with the redundancy number r. An exact observation (sd 0) has no residual. It is tested by the
+reaction of its constraint, the limit for s -> 0: w = k / s_k, MDB = delta0 / s_k, with the Lagrange
+multiplier k. Source: Baarda 1968, A testing procedure for use in geodetic networks; Pope 1976, The
+statistics of residuals; Foerstner 1987.
 """
 
 from dataclasses import dataclass, field
@@ -23,35 +22,55 @@ from tankcal.adjust import ALPHA, POWER, UNCONTROLLED, noncentrality
 from tankcal.solver.effects import constraint_reactions, own_leverage, own_responses, responses
 from tankcal.survey.network.blocks import test_values
 
-EXACTLY = 1e9  # products: up to here effects are worked out for all points, in about 0.2 s
+EXACTLY = 1e9  # products up to which effects on all points are computed, in about 0.2 s
 
 
 @dataclass(frozen=True)
 class Residuals:
-    """Residuals of one group of observations: n observations with m values each.
+    """Residuals of one group: n observations with m values each.
 
-    kind        in words                  unit        of value, residual, sd, mdb
-    source      "image points", the number in Survey.observations, or "known beforehand"
-    rows        (n,) row numbers there    used        (n,) False where set aside
-    residual    (n, m) computed minus observed
-    sd          (n, m) of the observation, a priori
-    redundancy  (n, m) 0 to 1; 1 for those set aside
-    w           (n, m) test quantity; of those set aside: of the difference to what the others say
-    test_statistic (n,) of the observation with all its values: |w|, or the root of what v'Pv would
-                lose without it, brought to the critical value of w (0.1 %)
-    mdb         (n, m) minimal detectable bias; inf where nothing controls the observation; of those
-                set aside: what it would be with them, r = 1 / (1 + leverage)
-    external    (n, m) effect of a blunder of that size on the adjusted quantities, in their sds
-    effect_m    (n, m) largest change of any coordinate of any point by a bias of mdb in this value,
-                in the datum of the adjustment; 0 for those set aside. In large surveys (rows times
-                unknowns times reduced unknowns above 1e9), of rows about one point: the largest
-                change of that point
-    elsewhere_m (n, m) bound in that case: no other point changes by more; None: effect_m is that of
-                all points
-    exact       True: the group holds exactly (sd 0); residual and redundancy are 0
-    pull        (n, m) sd (Pv), of correlated values; None: v over sd
-    changes     function -> change of a coordinate by a whitened error of one (exact: of one), own
-                or of all, and elsewhere or None; for effect_m, which costs more than all the rest
+    Attributes
+    ----------
+    kind : str
+    unit : str
+        Unit of residual, sd and mdb.
+    source : object
+        "image points", the number in Survey.observations, or "known beforehand".
+    rows : ndarray of int, shape (n,)
+        Row numbers in the source.
+    used : ndarray of bool, shape (n,)
+        False for rejected observations.
+    residual : ndarray, shape (n, m)
+        Computed minus observed.
+    sd : ndarray, shape (n, m)
+        A priori standard deviation of the observation.
+    redundancy : ndarray, shape (n, m)
+        0 to 1; 1 for rejected observations.
+    w : ndarray, shape (n, m)
+        Test statistic; for rejected observations that of the difference from the adjusted ones.
+    test_statistic : ndarray, shape (n,)
+        Statistic of the whole observation: |w|, or the root of the decrease of v'Pv without it,
+        scaled to the critical value of w (0.1 %).
+    mdb : ndarray, shape (n, m)
+        Minimal detectable bias; inf: not controlled; for rejected observations the value if they
+        were adjusted, r = 1 / (1 + leverage).
+    external : ndarray, shape (n, m)
+        Effect of a blunder of size mdb on the adjusted quantities, in their standard deviations.
+    effect_m : ndarray, shape (n, m)
+        Largest change of a coordinate of any point by a bias of mdb, in the datum of the
+        adjustment; 0 for rejected observations. In large surveys (rows times unknowns times reduced
+        unknowns above 1e9), for rows about one point: the largest change of that point.
+    elsewhere_m : ndarray, shape (n, m), or None
+        In that case an upper bound of the change of other points; None: effect_m includes all
+        points.
+    exact : bool
+        True: the group holds exactly (sd 0); residual and redundancy are 0.
+    pull : ndarray, shape (n, m), or None
+        sd (Pv) of correlated values; None: v over sd.
+    changes : callable
+        Returns the change of a coordinate per whitened unit error (exact: per unit error) for
+        effect_m and elsewhere_m. It is evaluated on demand, as it costs more than all other
+        attributes.
     """
 
     kind: str
@@ -72,7 +91,7 @@ class Residuals:
 
     @property
     def part_of_chi2(self):
-        """(n, m) v (Pv): they add up to v'Pv, and each is expected to be its redundancy number."""
+        """v (Pv), shape (n, m), with sum v'Pv; the expectation of each is its redundancy number."""
         whitened = np.divide(
             self.residual, self.sd, out=np.zeros_like(self.residual), where=self.sd > 0
         )
@@ -80,71 +99,87 @@ class Residuals:
 
     @cached_property
     def _effects(self):
-        """effect_m and elsewhere_m: bias times change, worked out when first asked for."""
-        found = self.changes()
+        """effect_m and elsewhere_m: bias times change, computed on first access."""
+        unit_changes = self.changes()
         with np.errstate(invalid="ignore"):
             biases = self.mdb / np.where(self.sd > 0, self.sd, 1.0)
             return tuple(
                 None if change is None else np.where(change > 0, biases * change, 0.0)
-                for change in found
+                for change in unit_changes
             )
 
     @property
     def effect_m(self):
-        """See above."""
+        """See the class docstring."""
         return self._effects[0]
 
     @property
     def elsewhere_m(self):
-        """See above."""
+        """See the class docstring."""
         return self._effects[1]
 
 
 def tau_limit(alpha, dof):
     """Two-sided critical value of Pope's tau distribution."""
+    # tau follows from Student's t with one degree of freedom fewer.
     t = -stdtrit(dof - 1, alpha / 2)
     return float(t * np.sqrt(dof) / np.sqrt(dof - 1 + t * t))
 
 
 def residuals_of(problem, solution, alpha=ALPHA, power=POWER):
-    """A tuple of Residuals, one for each group of a solved Problem, then what holds exactly."""
+    """Residuals of each group of a solved Problem, followed by exact observations.
+
+    Parameters
+    ----------
+    problem : Problem
+    solution : solver solution
+    alpha, power : float
+        Significance level and power of the tests.
+
+    Returns
+    -------
+    tuple of Residuals
+    """
     delta0 = noncentrality(alpha, power)
     tables = [_table(problem, solution, number, delta0) for number in range(problem.ordinary)]
     blocks = [
         table
         for number, members in problem.blocks
-        for table in _of_block(problem, solution, number, members, delta0)
+        for table in _block_residuals(problem, solution, number, members, delta0)
     ]
-    return (*tables, *blocks, *_of_exact(problem, solution, delta0))
+    return (*tables, *blocks, *_exact_residuals(problem, solution, delta0))
 
 
-def _of_block(problem, solution, number, members, delta0):
-    """Residuals of the values of a block of correlated observations, by the tables they are of.
+def _block_residuals(problem, solution, number, members, delta0):
+    """Yield Residuals of the values of a block of correlated observations, by table.
 
-    A value of an observation that is not in the block, though another one is, does not occur.
+    Values outside the block are omitted, even if another value of their observation is in it.
     """
-    found = test_values(problem, solution, number, members, delta0)
+    tests = test_values(problem, solution, number, members, delta0)
     parts = dict(zip(np.unique(members.source), _first_parts(members), strict=True))
-    for source, one in parts.items():
-        mine = np.flatnonzero(members.source == source)
-        rows, place = np.unique(members.row[mine], return_inverse=True)
-        shape = len(rows), one.rows
+    for source, first_part in parts.items():
+        is_of_source = np.flatnonzero(members.source == source)
+        rows, place = np.unique(members.row[is_of_source], return_inverse=True)
+        shape = len(rows), first_part.rows
 
-        def filled(values, place=place, mine=mine, shape=shape, empty=0.0):
+        def filled(values, place=place, is_of_source=is_of_source, shape=shape, empty=0.0):
             table = np.full(shape, empty)
-            column = members.component[mine] if shape[1] > 1 else 0
-            table[place, column] = values[mine]
+            column = members.component[is_of_source] if shape[1] > 1 else 0
+            table[place, column] = values[is_of_source]
             return table
 
         used, test = np.zeros(shape[0], dtype=bool), np.zeros(shape[0])
-        used[place], test[place] = members.share[mine] > 0, found.test_statistic[mine]
-        change = filled(found.change)
+        used[place], test[place] = (
+            members.share[is_of_source] > 0,
+            tests.test_statistic[is_of_source],
+        )
+        change = filled(tests.change)
         yield Residuals(
-            kind=one.kind, unit=one.unit, source=source, rows=rows, used=used,
-            residual=filled(found.residual), sd=filled(found.sd),
-            redundancy=filled(found.redundancy), w=filled(found.w), test_statistic=test,
-            mdb=filled(found.mdb), external=filled(found.external),
-            changes=lambda change=change: (change, None), pull=filled(found.pull),
+            kind=first_part.kind, unit=first_part.unit, source=source, rows=rows, used=used,
+            residual=filled(tests.residual), sd=filled(tests.sd),
+            redundancy=filled(tests.redundancy), w=filled(tests.w), test_statistic=test,
+            mdb=filled(tests.mdb), external=filled(tests.external),
+            changes=lambda change=change: (change, None), pull=filled(tests.pull),
         )  # fmt: skip
 
 
@@ -153,24 +188,27 @@ def _first_parts(members):
     sources = [members.source[first] for first in np.flatnonzero(
         np.append(True, np.diff(members.source) != 0))]  # fmt: skip
     parts = {}
-    for source, (one, _) in zip(sources, members.block.parts, strict=True):
-        parts.setdefault(source, one)
+    for source, (part, _) in zip(sources, members.block.parts, strict=True):
+        parts.setdefault(source, part)
     return [parts[source] for source in sorted(parts)]
 
 
 def _table(problem, solution, number, delta0):
     """The Residuals of a group."""
-    one = problem.observations[number]
-    use = np.ones(len(one)) if one.use is None else np.asarray(one.use, dtype=float)
-    whole = one if one.use is None else one.using(np.ones(len(one)))
+    group = problem.observations[number]
+    use = np.ones(len(group)) if group.use is None else np.asarray(group.use, dtype=float)
+    unweighted = group if group.use is None else group.using(np.ones(len(group)))
     columns = problem.model.groups[number].columns
-    v = np.empty((len(one), one.rows))
+    v = np.empty((len(group), group.rows))
     jac = np.empty((*v.shape, columns.shape[1]))
-    whole.fill(solution.unknowns, v, jac)
+    unweighted.fill(solution.unknowns, v, jac)
     leverage, aside = solution.cofactor.leverage(number, jac), use == 0
+    # Rejected rows are outside the range of the adjusted ones, so the datum adds to their leverage.
     leverage[aside] += solution.cofactor.leverage_of_datum(columns[aside], jac[aside])
     share = use[:, None]
+    # Redundancy number: one minus leverage, with the weight factor of the row.
     r = 1.0 - share * leverage
+    # Rejected: the variance of the observation and that of its prediction add.
     variance = np.where(share > 0, r, 1.0 + leverage)
     controlled = variance > UNCONTROLLED
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -178,35 +216,45 @@ def _table(problem, solution, number, delta0):
         mdb = np.where(
             controlled, delta0 * np.where(share > 0, 1 / variance, variance) ** 0.5, np.inf
         )
+        # External reliability delta0 sqrt((1 - r) / r).
         hidden = np.where(controlled, delta0 * np.sqrt(np.maximum(1 - r, 0) / r), np.inf)
-    sd, test = 1.0 / whole.weight, np.abs(w).max(axis=1)
-    if one.rows == 2:
+    sd, test = 1.0 / unweighted.weight, np.abs(w).max(axis=1)
+    if group.rows == 2:
         test = _both(solution, number, v, jac, share, leverage, variance, test)
     return Residuals(
-        kind=one.kind, unit=one.unit, source=problem.sources[number], rows=problem.rows_of[number],
-        used=use > 0, residual=v * sd, sd=sd, redundancy=r, w=w, test_statistic=test, mdb=mdb * sd,
-        external=hidden, changes=lambda: _changes(problem, solution, number, share),
+        kind=group.kind, unit=group.unit, source=problem.sources[number],
+        rows=problem.rows_of[number], used=use > 0, residual=v * sd, sd=sd, redundancy=r, w=w,
+        test_statistic=test, mdb=mdb * sd, external=hidden,
+        changes=lambda: _changes(problem, solution, number, share),
     )  # fmt: skip
 
 
 def _changes(problem, solution, number, share):
-    """Largest change (n, m) of a coordinate by a whitened error of one; a bound elsewhere or None.
+    """Largest change (n, m) of a coordinate per whitened unit error; a bound for other points or
+    None.
 
-    Elsewhere: a row moves the reduced unknowns by no more than sqrt(b S^-1 b'), b its part there,
-    in the norm of S, and a point follows these by no more than that times its sd from them.
+    The bound: a row moves the reduced unknowns by at most sqrt(b S^-1 b'), b its reduced part, in
+    the norm of S. A point follows by at most that times its standard deviation from these unknowns.
     """
-    one, columns = problem.observations[number], problem.model.groups[number].columns
-    jac = np.empty((len(one), one.rows, columns.shape[1]))
-    whole = one if one.use is None else one.using(np.ones(len(one)))
-    whole.fill(solution.unknowns, np.empty(jac.shape[:2]), jac)
+    group, columns = (
+        problem.observations[number],
+        problem.model.groups[number].columns,
+    )
+    jac = np.empty((len(group), group.rows, columns.shape[1]))
+    unweighted = group if group.use is None else group.using(np.ones(len(group)))
+    unweighted.fill(solution.unknowns, np.empty(jac.shape[:2]), jac)
     points = np.unique(problem.layout.points)
     points = points[points >= 0]
-    own, products = one.ties == ("point",), problem.model.unknowns * max(problem.model.reduced, 1)
-    if not own or jac.shape[0] * jac.shape[1] * products <= EXACTLY:
-        found = np.zeros(jac.shape[0] * jac.shape[1])
+    is_single_point, products = (
+        group.ties == ("point",),
+        problem.model.unknowns * max(problem.model.reduced, 1),
+    )
+    if not is_single_point or jac.shape[0] * jac.shape[1] * products <= EXACTLY:
+        largest_changes = np.zeros(jac.shape[0] * jac.shape[1])
         for part, response in responses(solution.cofactor, columns, jac):
-            found[part] = np.abs(response[points]).max(axis=0, initial=0.0)
-        return share * found.reshape(jac.shape[:2]), None
+            largest_changes[part] = np.abs(response[points]).max(axis=0, initial=0.0)
+        return share * largest_changes.reshape(jac.shape[:2]), None
+    # Change of the own point, exactly; the bound covers all other points.
     nearest = np.abs(own_responses(solution.cofactor, number, jac)).max(axis=2)
     reduced = solution.cofactor.leverage(number, jac)
     sd = np.einsum("nii->ni", solution.cofactor.block_cofactors)
@@ -220,36 +268,39 @@ def _changes(problem, solution, number, share):
     return share * nearest, share * largest * np.sqrt(np.maximum(reduced, 0.0))
 
 
-def _of_exact(problem, solution, delta0):
-    """Residuals of the observations that hold exactly; several rows of one: the last one counts."""
+def _exact_residuals(problem, solution, delta0):
+    """Yield Residuals of exact observations; of several conditions of an observation the last
+    counts."""
     if not problem.exact:
         return
     k, sd, changes = constraint_reactions(solution.cofactor)
     points = np.unique(problem.layout.points)
     moves = np.abs(changes[points[points >= 0]]).max(axis=0, initial=0.0)
+    # A condition may be a function of the observation; the lever converts it to the observed unit.
     levers = [held.conditions.lever(solution.unknowns).ravel() for held in problem.exact]
     levers = np.concatenate(levers)
     moves, k, sd = moves * levers, k * levers, sd * levers
     tested, first = sd > 0, 0
     with np.errstate(divide="ignore", invalid="ignore"):
+        # w = k / s_k, MDB = delta0 / s_k with the Lagrange multiplier k.
         w = np.where(tested, k / sd, 0.0)
         mdb = np.where(tested, delta0 / sd, np.inf)
     for held in problem.exact:
-        one, rows = held.observations, held.conditions.rows
-        mine = slice(first, first + len(held.row_of) * rows)
-        first = mine.stop
-        shape = len(one), one.rows
+        group, rows = held.observations, held.conditions.rows
+        slots = slice(first, first + len(held.row_of) * rows)
+        first = slots.stop
+        shape = len(group), group.rows
         parts = []
         for values in (w, mdb, moves):
             part = np.zeros(shape)
             if shape[1] == rows:
-                part[held.row_of] = values[mine].reshape(-1, rows)
-            else:  # a whole rotation: three rows of one
-                part[:] = values[mine].reshape(shape)
+                part[held.row_of] = values[slots].reshape(-1, rows)
+            else:  # a whole rotation: one observation with three conditions
+                part[:] = values[slots].reshape(shape)
             parts.append(part)
         none = np.zeros(shape)
         yield Residuals(
-            kind=one.kind, unit=one.unit, source=held.source, rows=held.rows,
+            kind=group.kind, unit=group.unit, source=held.source, rows=held.rows,
             used=np.ones(shape[0], dtype=bool), residual=none, sd=none, redundancy=none,
             w=parts[0], test_statistic=np.abs(parts[0]).max(axis=1), mdb=parts[1],
             external=np.full(shape, np.inf), exact=True,
@@ -258,17 +309,26 @@ def _of_exact(problem, solution, delta0):
 
 
 def _both(solution, group, v, jac, share, leverage, variance, single):
-    """Test quantity (n,) of two values together, from their residuals' covariance.
+    """Joint test statistic (n,) of two values, from the covariance of their residuals.
 
-    single  (n,) the quantity where only one direction is controlled
+    Parameters
+    ----------
+    solution : solver solution
+    group : int
+    v, jac, share, leverage, variance : ndarray
+        Residuals, whitened derivatives, weight factors, leverages and residual variances.
+    single : ndarray, shape (n,)
+        Statistic where only one direction is controlled.
     """
     sum_of_both = solution.cofactor.leverage(group, jac.sum(axis=1, keepdims=True))[:, 0]
+    # Polarization: (a + b)'Q(a + b) - a'Qa - b'Qb = 2 a'Qb.
     between = 0.5 * (sum_of_both - leverage.sum(axis=1))
     between = np.where(share[:, 0] > 0, -share[:, 0] * between, between)
     a, d = variance.T
     determinant = a * d - between**2
+    # Quadratic form v' R^-1 v of a 2 x 2 matrix, before division by the determinant.
     square = d * v[:, 0] ** 2 + a * v[:, 1] ** 2 - 2 * between * v[:, 0] * v[:, 1]
     sound = determinant > UNCONTROLLED * np.maximum(a * d, UNCONTROLLED)
     square = np.maximum(square, 0.0) / np.where(sound, determinant, 1.0)
-    one, two = -ndtri(ALPHA / 2), np.sqrt(chdtri(2, ALPHA))
-    return np.where(sound, np.sqrt(square) * one / two, single)
+    limit_of_one, limit_of_two = -ndtri(ALPHA / 2), np.sqrt(chdtri(2, ALPHA))
+    return np.where(sound, np.sqrt(square) * limit_of_one / limit_of_two, single)

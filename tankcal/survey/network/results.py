@@ -1,4 +1,4 @@
-"""The adjusted survey: points, photos, cameras, their covariance, and what the residuals say."""
+"""The adjusted survey: points, photos, cameras, their covariance, and tests of the residuals."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,19 +18,26 @@ from tankcal.survey.observations import KnownUnknowns
 def correlations(covariance):
     """Correlation matrix of a covariance (k, k); 0 where a variance is 0, 1 in the diagonal."""
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    # An infinite divisor turns rows without variance into zeros.
     size = np.where(sd > 0, sd, np.inf)
-    found = covariance / np.outer(size, size)
-    np.fill_diagonal(found, 1.0)
-    return found
+    matrix = covariance / np.outer(size, size)
+    np.fill_diagonal(matrix, 1.0)
+    return matrix
 
 
 @dataclass(frozen=True)
 class GlobalTest:
-    """Is the scatter what the standard deviations say?
+    """Test whether the scatter agrees with the standard deviations.
 
-    chi2    v'Pv                    dof          degrees of freedom
-    low     lower bound of chi2     high         upper bound (inf and 0 for one-sided tests)
-    passed  chi2 lies between them  confidence   of the test
+    Attributes
+    ----------
+    chi2 : float
+        v'Pv.
+    dof : int
+        Degrees of freedom.
+    low, high : float
+        Bounds of chi2 (0 or inf for one-sided tests).
+    confidence : float
     """
 
     chi2: float
@@ -46,7 +53,19 @@ class GlobalTest:
 
 
 def global_test(chi2, dof, confidence=0.95, sides=2):
-    """Test of v'Pv against the chi-square distribution, two-sided or (sides=1) upper."""
+    """Test v'Pv against the chi-square distribution, two-sided or (sides=1) upper.
+
+    Parameters
+    ----------
+    chi2 : float
+    dof : int
+    confidence : float
+    sides : int
+
+    Returns
+    -------
+    GlobalTest
+    """
     tail = (1 - confidence) / sides
     low = 2 * gammaincinv(dof / 2, tail) if sides == 2 else 0.0
     return GlobalTest(chi2, dof, float(low), float(chdtri(dof, tail)), confidence)
@@ -54,23 +73,23 @@ def global_test(chi2, dof, confidence=0.95, sides=2):
 
 @dataclass(frozen=True)
 class Adjusted:
-    """An adjusted Survey. All covariances here are a priori: of variance factor 1.
+    """An adjusted Survey. All covariances are a priori, with variance factor 1.
 
-    One rule for their scale: what goes on to the capacity table is the covariance a priori, from
-    the declared sds, whatever sigma0 came out; the report shows sigma0 and the global test beside
-    it. Only where the user asks for scale "a_posteriori" everything is multiplied by
-    `scale("a_posteriori")`, sigma0 squared, and dof go with it. Never the smaller or larger of the
-    two, never a part of the covariances: a test that is not passed is a doubt about observations or
-    sds, to be cleared there (variance components, data snooping) and not by a factor.
+    The capacity table uses the a priori covariance from the declared standard deviations, whatever
+    the value of sigma0. The report states sigma0 and the global test beside it. Only if the user
+    requests scale "a_posteriori", all covariances are multiplied by `scale("a_posteriori")`, sigma0
+    squared, with dof degrees of freedom. The smaller or larger of the two is never selected, and no
+    part of the covariances is scaled separately. A failed test questions observations or standard
+    deviations; the remedy is variance components or data snooping, not a factor.
 
     Attributes
     ----------
     survey : Survey
-        As it was handed in.
+        Input of the adjustment.
     problem : Problem
-        The one that was solved.
+        Problem that was solved.
     solution : tankcal.adjust.Adjustment
-        Its rows and chi2 with the scatter of repeated readings.
+        Its rows and chi2 include the scatter of repeated readings.
     """
 
     survey: object
@@ -79,23 +98,28 @@ class Adjusted:
 
     @property
     def sigma0(self):
-        """A-posteriori root of the variance factor; nan when nothing is redundant."""
+        """A posteriori root of the variance factor; nan without redundancy."""
         return self.solution.sigma0
 
     @property
     def chi2(self):
-        """v'Pv, with the scatter of repeated readings about their means."""
+        """v'Pv, including the scatter of repeated readings about their means."""
         return self.solution.chi2
 
     @property
     def dof(self):
-        """Degrees of freedom, those of repeated readings among them."""
+        """Degrees of freedom, including those of repeated readings."""
         return self.solution.dof
 
     def scale(self, choice="a_priori"):
-        """What all covariances are multiplied by: 1 for "a_priori", sigma0^2 for "a_posteriori".
+        """Variance factor of all covariances: 1 for "a_priori", sigma0^2 for "a_posteriori".
 
-        Raises SolutionError when nothing is redundant: there is no a-posteriori factor then.
+        Raises
+        ------
+        SolutionError
+            For "a_posteriori" without redundancy.
+        ValueError
+            For another choice.
         """
         if choice == "a_priori":
             return 1.0
@@ -112,7 +136,7 @@ class Adjusted:
 
     @property
     def xyz_m(self):
-        """(points, 3) adjusted coordinates; nan for points that were set aside."""
+        """Adjusted coordinates (points, 3); nan for points that were not adjusted."""
         return self.problem.centre_m + np.where(
             self.problem.aside[:, None], np.nan, self._state.xyz_m
         )
@@ -122,42 +146,58 @@ class Adjusted:
         return self.solution.unknowns
 
     def effect_of_known_m(self, of, index):
-        """Change (3 points,) of all coordinates by one sd of an unknown known beforehand.
+        """Change (3 points,) of all coordinates by one standard deviation of a weighted unknown.
 
-        of     as KnownUnknowns: "scale", "offset_m" (of instruments), "interior", "orientation_rad"
-               or "system_scale"
-        index  place in that field: the number of the instrument; for "interior"
-               problem.interior_of[photo, number of the parameter]
+        If the a priori value is larger by its sd, the adjusted coordinates change by this column.
+        column column' is the contribution of the unknown to their covariance. It is zero for fixed
+        and free unknowns.
 
-        x, y, z of the first point, then of the next. With the value known beforehand larger by its
-        sd, the adjusted coordinates are larger by this; column column' is its part of their
-        covariance. Zeros for an unknown that was not weighted (fixed ones, free ones).
+        Parameters
+        ----------
+        of : str
+            As in KnownUnknowns: "scale", "offset_m" (of instruments), "interior", "orientation_rad"
+            or "system_scale".
+        index : int
+            Index in that field: the number of the instrument; for "interior"
+            problem.interior_of[photo, number of the parameter].
+
+        Returns
+        -------
+        ndarray, shape (3 points,)
+            x, y, z of the first point, then of the next.
         """
         problem, solution = self.problem, self.solution
         columns = problem.layout.points.ravel()
-        found = np.zeros(len(columns))
-        for number, one in enumerate(problem.observations):
-            if not isinstance(one, KnownUnknowns) or one.of != of:
+        effect = np.zeros(len(columns))
+        for number, group_of_known in enumerate(problem.observations):
+            if not isinstance(group_of_known, KnownUnknowns) or group_of_known.of != of:
                 continue
-            for row in np.flatnonzero(one.index == index):
+            for row in np.flatnonzero(group_of_known.index == index):
                 group = problem.model.groups[number].columns[row : row + 1]
                 jac = solution.cofactor.jacobians[number][row : row + 1]
+                # Response of all unknowns to a unit error of the whitened row, that is to one sd.
                 _, response = next(responses(solution.cofactor, group, jac))
-                found += np.append(response[:, 0], 0.0)[columns]
-        return found
+                effect += np.append(response[:, 0], 0.0)[columns]
+        return effect
 
     def covariance_m2(self, points=None):
-        """Full covariance (3k, 3k) of chosen points (numbers), of all when None; fixed ones: 0."""
+        """Covariance (3k, 3k) of points by number, of all when None; 0 for fixed coordinates."""
         columns = self.problem.layout.points
         return self._cofactors((columns if points is None else columns[np.asarray(points)]).ravel())
 
     def joint_covariance(self, points, **nuisances):
-        """Covariance of points and of unknowns that observations share; fixed ones: 0.
+        """Covariance of points and of shared unknowns; 0 for fixed ones.
 
-        points     numbers (k,)
-        nuisances  numbers of each wanted name of NUISANCES, in the order of the keywords
+        Parameters
+        ----------
+        points : sequence of int, length k
+        **nuisances : sequence of int
+            Numbers of the unknowns of each name of NUISANCES.
 
-        First x, y, z of each point, then the others.
+        Returns
+        -------
+        ndarray
+            x, y, z of each point first, then the shared unknowns in the order of the keywords.
         """
         layout = self.problem.layout
         columns = [layout.points[np.asarray(points, dtype=int)].ravel()]
@@ -165,57 +205,62 @@ class Adjusted:
         return self._cofactors(np.concatenate(columns))
 
     def nuisance(self, of):
-        """(k,) values of the unknowns of a name of NUISANCES."""
+        """Values (k,) of the unknowns of a name of NUISANCES."""
         return self._state.nuisance[of]
 
     def _cofactors(self, columns):
-        """Cofactors (k, k) of unknowns, 0 for those that are fixed."""
+        """Cofactors (k, k) of unknowns, 0 for fixed ones."""
         if (columns >= 0).all():
             return self.solution.cofactor.among(columns)
-        whole = np.zeros((len(columns), len(columns)))
+        cofactors = np.zeros((len(columns), len(columns)))
         free = np.flatnonzero(columns >= 0)
-        whole[np.ix_(free, free)] = self.solution.cofactor.among(columns[free])
-        return whole
+        cofactors[np.ix_(free, free)] = self.solution.cofactor.among(columns[free])
+        return cofactors
 
     @cached_property
     def point_covariances_m2(self):
-        """(points, 3, 3) covariance of each point; fixed coordinates: 0."""
+        """Covariance (points, 3, 3) of each point; 0 for fixed coordinates."""
         columns, nr = self.problem.layout.points, self.problem.model.reduced
-        whole = np.zeros((len(columns), 3, 3))
+        covariances = np.zeros((len(columns), 3, 3))
         last = self.problem.eliminated
-        whole[last] = self.solution.cofactor.block_cofactors[(columns[last, 0] - nr) // 3]
+        # Eliminated points have their covariance as a block of the solver; the others need a
+        # solution.
+        covariances[last] = self.solution.cofactor.block_cofactors[(columns[last, 0] - nr) // 3]
         rest = np.flatnonzero(~last)
         if len(rest):
-            whole[rest] = self._small_blocks(columns[rest])
-        return whole
+            covariances[rest] = self._small_blocks(columns[rest])
+        return covariances
 
     def _small_blocks(self, columns):
         """Covariances (n, k, k) of small groups (n, k) of reduced unknowns."""
         pair = columns[:, :, None], columns[:, None, :]
-        found = self.solution.cofactor.reduced_blocks(columns)
-        return np.where((pair[0] >= 0) & (pair[1] >= 0), found, 0.0)
+        cofactors = self.solution.cofactor.reduced_blocks(columns)
+        # Column -1 marks a fixed unknown, whose variance is 0.
+        return np.where((pair[0] >= 0) & (pair[1] >= 0), cofactors, 0.0)
 
     @property
     def point_sd_m(self):
-        """(points, 3) standard deviations."""
+        """Standard deviations (points, 3), m."""
         return np.sqrt(np.maximum(np.einsum("nii->ni", self.point_covariances_m2), 0.0))
 
     @cached_property
     def photos(self):
-        """(xyz_m (n, 3), angles_rad (n, 3), covariance (n, 6, 6)) of the photos.
+        """Positions (n, 3), m, angles (n, 3), rad, and covariance (n, 6, 6) of the photos.
 
-        The angles are omega, phi, kappa; the covariance is that of x, y, z, omega, phi, kappa.
+        The angles are omega, phi, kappa; the covariance refers to x, y, z, omega, phi, kappa.
         """
         rotation = self._state.rotation
         q = self._small_blocks(self.problem.layout.photos)
         turn = np.zeros((len(q), 6, 6))
         turn[:, :3, :3] = np.eye(3)
+        # The unknowns are small rotations; the users' angles need their derivatives.
         turn[:, 3:, 3:] = angle_derivatives(rotation)
         covariance = turn @ q @ turn.transpose(0, 2, 1)
         return self.problem.centre_m + self._state.photo_xyz_m, angles_of(rotation), covariance
 
     def camera(self, photo=0):
-        """{parameter: value} and covariance (k, k) of those adjusted, as a photo has them."""
+        """Interior parameters of a photo: {parameter: value}, names of adjusted ones, their
+        covariance (k, k)."""
         places = self.problem.interior_of[photo]
         values = dict(zip(PARAMETERS, self._state.interior[places].tolist(), strict=True))
         columns = self.problem.layout.interior[places]
@@ -224,9 +269,9 @@ class Adjusted:
 
     @cached_property
     def residuals(self):
-        """A tuple of Residuals, one for each group of observations (alpha 0.001, power 0.80)."""
+        """Residuals of each group of observations (alpha 0.001, power 0.80), as a tuple."""
         return residuals_of(self.problem, self.solution)
 
     def test(self, confidence=0.95, sides=2):
-        """The GlobalTest of the whole adjustment."""
+        """The GlobalTest of the adjustment."""
         return global_test(self.chi2, self.dof, confidence, sides)

@@ -1,4 +1,4 @@
-"""What is determined on paper only: an sd so large that the linear model does not hold."""
+"""Unknowns that are determined only formally: standard deviations beyond the linear model."""
 
 import numpy as np
 
@@ -7,11 +7,11 @@ from tankcal.messages import message
 from tankcal.survey.network.datum import datum_defect_sentence, null_space
 
 WORTHLESS = 0.1  # sd over the principal distance, or over the extent of the survey
-HANGING = 0.03  # see datum.UNFELT: what holds the survey so weakly, noise alone can hold
+HANGING = 0.03  # see datum.UNFELT: a survey held so weakly may be held by noise alone
 
 
 def refuse_worthless_cameras(survey, problem, solution):
-    """Raise SolutionError when the network does not determine a principal distance c."""
+    """Raise SolutionError if the network does not determine a principal distance c."""
     first = {}
     for photo, column in enumerate(problem.layout.interior[problem.interior_of[:, 0]].tolist()):
         first.setdefault(column, photo)
@@ -21,6 +21,7 @@ def refuse_worthless_cameras(survey, problem, solution):
     photo = [first[column] for column in columns]
     unit = np.zeros((problem.model.reduced, len(columns)))
     unit[columns, np.arange(len(columns))] = 1.0
+    # With N = L L', the variance of an unknown is the squared norm of L^-1 e.
     sd = np.sqrt(np.sum(solution.cofactor.factor.whitened(unit) ** 2, axis=0))
     value = solution.unknowns.interior[problem.interior_of[photo, 0]]
     for i in np.flatnonzero(~(sd < WORTHLESS * np.abs(value)))[:1]:
@@ -38,14 +39,16 @@ def refuse_worthless_cameras(survey, problem, solution):
 
 
 def find_hardly_determined(adjusted):
-    """Sentences on points whose sd is above a tenth of the survey's extent.
+    """Sentences on points with a standard deviation above a tenth of the extent of the survey.
 
-    The extent is four times the median distance of the points from their median place: a point that
-    went astray does not stretch it.
+    The extent is four times the median distance of the points from their median position, which a
+    diverging point does not enlarge.
     """
     sd, xyz = np.max(adjusted.point_sd_m, axis=1), adjusted.xyz_m
-    there = xyz[np.isfinite(xyz).all(axis=1)]
-    extent = 4 * np.median(np.linalg.norm(there - np.median(there, axis=0), axis=1))
+    adjusted_points = xyz[np.isfinite(xyz).all(axis=1)]
+    extent = 4 * np.median(
+        np.linalg.norm(adjusted_points - np.median(adjusted_points, axis=0), axis=1)
+    )
     return tuple(
         message(
             "hardly_determined",
@@ -58,6 +61,6 @@ def find_hardly_determined(adjusted):
 
 
 def weak_datum_sentence(problem):
-    """Words on a datum that hangs on next to nothing, "" when it does not."""
+    """Sentence on a datum that is almost undetermined, or ""."""
     free = null_space(problem, HANGING)
     return f"; {datum_defect_sentence(free, problem)}" if free.shape[1] else ""

@@ -1,4 +1,4 @@
-"""A survey as it goes into the adjustment: names, start values and observations, all in arrays."""
+"""A survey as input of the adjustment: names, start values and observations, as arrays."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -9,29 +9,28 @@ from tankcal.camera.model import PARAMETERS, Form
 
 IMAGES = "image points"  # source of the image coordinates
 SCOPES = ("off", "block", "camera", "photo")
-FEWEST = 3  # values that speak of a point that can be determined
+FEWEST = 3  # values required to determine a point
 STATES = ("free", "weighted", "fixed")
 DEFAULT_SCOPE = tuple("off" if name in ("K4", "P3", "P4") else "camera" for name in PARAMETERS)
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera and what the adjustment may do with each of its parameters (PARAMETERS).
+    """A camera, and the treatment of its parameters (PARAMETERS) in the adjustment.
 
     Attributes
     ----------
     values : ndarray, shape (13,)
         In the order of PARAMETERS, mm.
     form : Form
-        How its distortion is written.
+        Form of the distortion.
     sd : ndarray, shape (13,)
-        Standard deviations known beforehand, for the weighted ones.
+        A priori standard deviations of weighted parameters.
     scope : tuple
-        13 of SCOPES: left out; one value for all photos, for each camera, for each photo.
+        13 of SCOPES: omitted; one value for all photos, for each camera, for each photo.
     state : tuple
         13 of STATES.
     name : str
-        As the user knows it.
     """
 
     values: np.ndarray
@@ -44,12 +43,11 @@ class Camera:
 
 @dataclass(frozen=True)
 class Photos:
-    """Photographs. Values that are nan are not known and have to be found.
+    """Photographs; unknown values are nan.
 
     Attributes
     ----------
     names : tuple of str
-        Of the photos.
     camera : ndarray, shape (n,)
         Number of the camera.
     xyz_m : ndarray, shape (n, 3)
@@ -57,7 +55,7 @@ class Photos:
     rotation : ndarray, shape (n, 3, 3)
         R3(kappa) R2(phi) R1(omega).
     fixed : ndarray, shape (n, 4)
-        True: x, y, z, the rotation is not adjusted.
+        True: x, y, z, or the rotation is not adjusted.
     """
 
     names: tuple
@@ -69,12 +67,12 @@ class Photos:
 
 @dataclass(frozen=True)
 class Instrument:
-    """An instrument whose readings are (1 + scale) true + offset.
+    """An instrument with readings (1 + scale) true + offset.
 
     Attributes
     ----------
     scale_sd, offset_sd_m : float
-        0: fixed at the value; nan: free; else a weighted unknown.
+        0: fixed at the value; nan: free; otherwise a weighted unknown.
     """
 
     name: str
@@ -91,7 +89,7 @@ class System:
     Attributes
     ----------
     scale_free : bool
-        Whether its scale is an unknown.
+        Whether the scale is unknown.
     """
 
     name: str
@@ -103,16 +101,16 @@ class System:
 
 @dataclass(frozen=True)
 class Shared:
-    """The k unknowns of a survey that have one name of `observations.NUISANCES`.
+    """The k unknowns of a survey with one name of `observations.NUISANCES`.
 
     Attributes
     ----------
-    owners : tuple
-        (k,) whose each is, as the user calls it.
+    owners : tuple, length k
+        Names of the instruments or direction sets.
     value : ndarray, shape (k,)
-        Start, and known beforehand where it has an sd.
+        Start value, and a priori value where it has an sd.
     sd : ndarray, shape (k,)
-        0: fixed at the value; nan: free; else a weighted unknown.
+        0: fixed at the value; nan: free; otherwise a weighted unknown.
     """
 
     owners: tuple
@@ -122,27 +120,27 @@ class Shared:
 
 @dataclass(frozen=True)
 class Survey:
-    """Everything that goes into one adjustment. Coordinates are in the survey's frame.
+    """Input of one adjustment. Coordinates are in the frame of the survey.
 
-    The scatter of the readings that were averaged into an observation (its Trace) counts in sigma0
-    and in the redundancy as if they had been adjusted one by one.
+    The scatter of readings averaged into an observation (its Trace) counts in sigma0 and in the
+    redundancy as if the readings had been adjusted separately.
 
     Attributes
     ----------
     points : tuple of str
-        Their names.
+        Names.
     xyz_m : ndarray, shape (points, 3)
         Start values.
     fixed : ndarray, shape (points, 3)
-        True: not adjusted; None: nothing is.
+        True: not adjusted; None: all are adjusted.
     image_points : ImageCoordinates or None
         Of all cameras.
     photos : Photos or None
         None: no photographs.
     cameras : tuple of Camera
-        Whose photos these are.
+        Cameras of the photos.
     observations : tuple of tankcal.survey.observations
-        With coordinates in the survey's frame.
+        With coordinates in the frame of the survey.
     sets : ndarray, shape (s,)
         Start azimuths of the zeros of the direction sets, rad.
     set_names : tuple
@@ -150,12 +148,11 @@ class Survey:
     instruments : tuple of Instrument
         With a scale or an offset.
     systems : tuple of System
-        Further frames of coordinates.
+        Further coordinate systems.
     correlated : tuple of tankcal.survey.observations.Block
-        Values of the observations (none of them
-        held exactly) that are correlated; no value stands in two.
+        Correlated values of the observations, none of them exact; no value is in two blocks.
     kept : frozenset
-        (file, row) of readings that no search for blunders may set aside.
+        (file, row) of readings that data snooping must not reject.
     """
 
     points: tuple
@@ -174,17 +171,19 @@ class Survey:
 
     @cached_property
     def nuisances(self):
-        """{name of `observations.NUISANCES`: Shared}: unknowns that observations share."""
+        """{name of `observations.NUISANCES`: Shared} of the unknowns shared by observations."""
         tools, sets = self.instruments, len(self.sets)
         names = tuple(tool.name for tool in tools)
 
-        def of(field):
+        def attribute_of_tools(field):
             return np.array([getattr(tool, field) for tool in tools], dtype=float)
 
         circles = tuple(f"direction set {i + 1}" for i in range(sets))
         return {
-            "scale": Shared(names, of("scale"), of("scale_sd")),
-            "offset_m": Shared(names, of("offset_m"), of("offset_sd_m")),
+            "scale": Shared(names, attribute_of_tools("scale"), attribute_of_tools("scale_sd")),
+            "offset_m": Shared(
+                names, attribute_of_tools("offset_m"), attribute_of_tools("offset_sd_m")
+            ),
             "orientation_rad": Shared(
                 circles, np.array(self.sets, dtype=float), np.full(sets, np.nan)
             ),
@@ -192,39 +191,44 @@ class Survey:
 
     @property
     def tables(self):
-        """{source: Observations} of everything that was observed, as Residuals name it."""
-        found = dict(enumerate(self.observations))
-        return found if self.image_points is None else found | {IMAGES: self.image_points}
+        """{source: Observations} of all observations, with sources as in Residuals."""
+        observed = dict(enumerate(self.observations))
+        return observed if self.image_points is None else observed | {IMAGES: self.image_points}
 
     def table(self, source):
-        """The observations of a source as Residuals name it; None: they are not in the survey."""
+        """The observations of a source as in Residuals; None if absent."""
         return self.tables.get(source)
 
     def by_form(self, images):
-        """Pairs (Form, rows (k,)) of image coordinates (n,) whose cameras have one form."""
+        """Pairs (Form, rows (k,)) of image coordinates (n,) of cameras with the same form."""
         forms = {}
         for number, camera in enumerate(self.cameras):
             forms.setdefault(camera.form, []).append(number)
         if len(forms) == 1:
             return [(form, np.arange(len(images))) for form in forms]
         camera = self.photos.camera[images.photo]
-        return [(form, np.isin(camera, mine).nonzero()[0]) for form, mine in forms.items()]
+        return [
+            (form, np.isin(camera, cameras_of_form).nonzero()[0])
+            for form, cameras_of_form in forms.items()
+        ]
 
     def values_of_points(self):
-        """(points,) how many values, fixed coordinates among them, speak of each point."""
+        """Number (points,) of values, including fixed coordinates, of each point."""
         count = np.zeros(len(self.points), dtype=int)
-        for one in self.tables.values():
-            for name in one.ties:
-                count += one.rows * np.bincount(one.of_used(name), minlength=len(count))
+        for table in self.tables.values():
+            for name in table.ties:
+                count += table.rows * np.bincount(table.of_used(name), minlength=len(count))
+        # A fixed coordinate counts like an observed one.
         return count if self.fixed is None else count + self.fixed.sum(axis=1)
 
     def without(self, sources):
-        """The survey without some of its tables of observations (numbers), correlations with them.
+        """The survey without some tables of observations (numbers) and correlations with them.
 
-        The others are counted anew, in `correlated` as well.
+        The remaining tables are renumbered, also in `correlated`.
         """
         kept = [i for i in range(len(self.observations)) if i not in set(sources)]
         number = np.full(len(self.observations), -1)
+        # Blocks refer to tables by number, so map old numbers to new ones; -1: removed.
         number[kept] = np.arange(len(kept))
         blocks = []
         for block in self.correlated:
@@ -246,17 +250,18 @@ class Survey:
         )
 
     def with_sds(self, factors):
-        """The survey with the sds of groups multiplied; factors {source: factor}, see Residuals."""
+        """The survey with the standard deviations of groups multiplied by {source: factor}."""
         observations = tuple(
-            replace(one, sd=one.sd * factors.get(number, 1.0))
-            for number, one in enumerate(self.observations)
+            replace(item, sd=item.sd * factors.get(number, 1.0))
+            for number, item in enumerate(self.observations)
         )
         images = self.image_points
         if images is not None:
             images = replace(images, sd=images.sd * factors.get(IMAGES, 1.0))
         blocks = tuple(
-            replace(one, covariance=one.covariance * np.outer(size, size))
-            for one in self.correlated
-            for size in [np.array([factors.get(i, 1.0) for i in one.source.tolist()])]
+            # A covariance scales with the product of both factors.
+            replace(item, covariance=item.covariance * np.outer(size, size))
+            for item in self.correlated
+            for size in [np.array([factors.get(i, 1.0) for i in item.source.tolist()])]
         )
         return replace(self, observations=observations, image_points=images, correlated=blocks)

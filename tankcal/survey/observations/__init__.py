@@ -1,4 +1,4 @@
-"""The kinds of observation: what each one computes, and its derivatives."""
+"""Kinds of observation: their equations and derivatives."""
 
 from tankcal.survey.observations.base import Layout, Observations, State
 from tankcal.survey.observations.coordinates import (

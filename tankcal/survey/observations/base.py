@@ -1,8 +1,8 @@
-"""What every kind of observation has, and the unknowns that it may speak about.
+"""Base class of observations, and the unknowns of their equations.
 
-A kind is a frozen table of n observations with m values each. It knows how to compute them from a
-State and their derivatives; it knows no solver. `fill` writes (computed - observed) / sd and the
-derivatives over the sd, `columns` says to which unknowns these belong.
+Each kind of observation is a frozen table of n observations with m values each. It computes them
+and their derivatives from a State and is independent of the solver. `fill` writes (computed -
+observed) / sd and the derivatives over the sd; `columns` returns the unknowns of the derivatives.
 """
 
 from dataclasses import dataclass, field, replace
@@ -18,7 +18,7 @@ from tankcal.survey.observations.trace import Trace
 
 @dataclass(frozen=True)
 class State:
-    """Values of all unknowns; coordinates are relative to the survey's centre.
+    """Values of all unknowns; coordinates are relative to the centre of the survey.
 
     Attributes
     ----------
@@ -28,10 +28,10 @@ class State:
     rotation : ndarray, shape (photos, 3, 3)
         R3(kappa) R2(phi) R1(omega).
     interior : ndarray, shape (q + 1,)
-        Interior parameters, mm; the last is 0, for those left out.
+        Interior parameters, mm; the last is 0, for omitted parameters.
     nuisance : dict
         Values (k,) of each name of NUISANCES: "scale" and "offset_m" of instruments (reading = true
-        (1 + scale) + offset), "orientation_rad" of direction sets (azimuth of the circle's zero).
+        (1 + scale) + offset), "orientation_rad" of direction sets (azimuth of the circle zero).
     system : ndarray, shape (systems, 3, 3)
         Rotations of further control systems.
     system_shift_m : ndarray, shape (systems, 3)
@@ -51,7 +51,7 @@ class State:
 
 @dataclass(frozen=True)
 class Layout:
-    """Column of each unknown in the adjustment, -1 where it is fixed or left out.
+    """Column of each unknown in the adjustment, -1 for fixed or omitted unknowns.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Layout:
     photos : ndarray of int, shape (photos, 6)
     interior : ndarray of int, shape (q + 1,)
     nuisance : dict
-        Of each name of NUISANCES, ndarray of int, shape (k,).
+        {name of NUISANCES: ndarray of int, shape (k,)}.
     system : ndarray of int, shape (systems, 7)
         Rotation, shift, scale.
     """
@@ -73,12 +73,13 @@ class Layout:
     @property
     def unknowns(self):
         """Number of unknowns."""
-        named = (one for one in vars(self).values() if isinstance(one, np.ndarray))
-        return 1 + max(one.max(initial=-1) for one in (*named, *self.nuisance.values()))
+        arrays = (columns for columns in vars(self).values() if isinstance(columns, np.ndarray))
+        return 1 + max(columns.max(initial=-1) for columns in (*arrays, *self.nuisance.values()))
 
     def moved(self, state, step):
-        """The state after a step (unknowns,); rotations are turned, everything else is added."""
-        step = np.append(step, 0.0)  # column -1, the fixed ones, does not move
+        """The state after a step (unknowns,): rotations are multiplied, all other unknowns
+        added."""
+        step = np.append(step, 0.0)  # column -1, of fixed unknowns, does not move
         photos = step[self.photos]
         changes = {"xyz_m": state.xyz_m + step[self.points]}
         if len(photos):
@@ -86,8 +87,8 @@ class Layout:
             changes["rotation"] = apply_small_rotation(state.rotation, photos[:, 3:])
             changes["interior"] = state.interior + step[self.interior]
         changes["nuisance"] = {
-            of: value + step[self.nuisance[of]] if len(value) else value
-            for of, value in state.nuisance.items()
+            name: value + step[self.nuisance[name]] if len(value) else value
+            for name, value in state.nuisance.items()
         }
         if len(self.system):
             system = step[self.system]
@@ -99,18 +100,18 @@ class Layout:
 
 @dataclass(frozen=True)
 class Observations:
-    """Observations of one kind; subclasses add what they tie together.
+    """Observations of one kind; subclasses add the points and other items that they connect.
 
     Attributes
     ----------
-    value : ndarray, shape (n,)
-        Or (n, m) observed.
-    sd : ndarray
-        Like value, standard deviations.
+    value : ndarray, shape (n,) or (n, m)
+        Observed values.
+    sd : ndarray, like value
+        Standard deviations.
     use : ndarray, shape (n,)
-        Share with which each takes part: 1, 0 when set aside, between for robust starts.
+        Weight factor: 1, 0 if rejected, between for robust starts.
     trace : Trace
-        Which readings they were made of; None: of none that a user gave.
+        Readings of the observations; None: no readings of a user.
     """
 
     value: np.ndarray
@@ -121,37 +122,43 @@ class Observations:
     kind = "observation"
     unit = "m"
     rows = 1
-    feels_datum = True  # False: no motion or scale of the whole survey changes it
-    ties = ()  # names of the fields that hold points
-    nuisances = ()  # pairs: a name of NUISANCES, the field with each row's number; -1: none
-    axes = (0, 1, 2)  # of the points' coordinates that enter: x, y, z
-    places_points = False  # True: from one end that is known it tells where the other may be
-    knows_frame = False  # True: it has `off_frame(d)`, its misfits, m, of differences (n, 3)
-    of_survey = True  # False: it speaks of points in another frame, and measures none
-    shared = ()  # names of the arrays that hold for the whole table; all others have n rows
+    feels_datum = True  # False: invariant under motions and scale of the whole survey
+    ties = ()  # names of the fields that contain points
+    nuisances = ()  # pairs: a name of NUISANCES, the field with the number for each row; -1: none
+    axes = (0, 1, 2)  # coordinates of the points in the equation: x, y, z
+    places_points = False  # True: determines the position of one end from the other
+    knows_frame = False  # True: has `off_frame(d)`, misfits, m, of differences (n, 3)
+    of_survey = True  # False: refers to another frame and measures no point
+    shared = ()  # names of the arrays of the whole table; all others have n rows
 
     def __len__(self):
         return len(self.value)
 
     @cached_property
     def weight(self):
-        """(n, m) what misclosures are multiplied by: root of `use`, over the sd."""
+        """Factors (n, m) of the misclosures: root of `use`, over the sd."""
         weight = 1.0 / np.asarray(self.sd, dtype=float).reshape(len(self), self.rows)
         return weight if self.use is None else weight * np.sqrt(self.use)[:, None]
 
     @property
     def in_use(self):
-        """(n,) True for those that take part."""
+        """Mask (n,), True where not rejected."""
         return np.ones(len(self), dtype=bool) if self.use is None else np.asarray(self.use) > 0
 
     def of_used(self, name):
-        """The field of that name, of those that take part."""
+        """The field of a name, without rejected rows."""
         field = getattr(self, name)
         return field if self.use is None else field[self.in_use]
 
     @property
     def exact(self):
-        """(n,) True for those that hold exactly: sd 0; SolutionError when only a part of one."""
+        """Mask (n,) of exact observations (sd 0).
+
+        Raises
+        ------
+        SolutionError
+            If only some values of an observation have sd 0.
+        """
         zero = np.reshape(self.sd, (len(self), self.rows)) == 0
         if not zero.any():
             return np.zeros(len(self), dtype=bool)
@@ -167,26 +174,29 @@ class Observations:
         return exact
 
     def conditions(self):
-        """Observations with sd 0, to be filled without an sd, and which each row is of (k,)."""
+        """Exact observations as conditions without sd, and the observation number (k,) of each
+        row."""
+        # Conditions have no weight: the unit sd leaves the equation unscaled.
         return replace(self, sd=np.ones(np.shape(self.value)), use=None), np.arange(len(self))
 
     def lever(self, state):
-        """(n, m) change of a condition over that of its observation."""
+        """Change (n, m) of a condition per change of its observation."""
         return np.ones((len(self), self.rows))
 
     def relative(self, centre):
-        """The same for coordinates that count from a centre (3,)."""
+        """The observations with coordinates relative to a centre (3,)."""
         return self
 
     def without_derivatives(self, state):
-        """(n,) True where no derivative exists: both ends of a sight are at one place."""
+        """Mask (n,), True where no derivative exists because both ends of a sight coincide."""
         return np.zeros(len(self), dtype=bool)
 
     def taken(self, keep, **changes):
-        """The observations `keep` (indices, a mask or a slice), other fields changed."""
+        """Select observations by indices, a mask or a slice, and change other fields."""
         if not isinstance(keep, slice):
             keep = np.asarray(keep)
             keep = keep.nonzero()[0] if keep.dtype == bool else keep
+        # Only fields with one row per observation are indexed; cached arrays are not fields.
         parts = {
             name: value[keep] if isinstance(keep, slice) else value.take(keep, axis=0)
             for name, value in vars(self).items()
@@ -199,36 +209,39 @@ class Observations:
         return replace(self, **parts, **changes)
 
     def using(self, use):
-        """The same observations, each with its share (n,)."""
+        """The observations with weight factors (n,)."""
         return replace(self, use=np.asarray(use, dtype=float))
 
     def columns(self, layout):
-        """(n, K) column of the unknown of each derivative, -1 where it is fixed.
+        """Column (n, K) of the unknown of each derivative, -1 for fixed unknowns.
 
-        Three of each point of `ties`, one of each of `nuisances`.
+        Three for each point of `ties`, followed by one for each of `nuisances`.
         """
         points = [layout.points[getattr(self, name)] for name in self.ties]
-        others = (one[:, None] for one in self._each(layout.nuisance, -1))
-        return np.concatenate([*points, *others], axis=1)
+        shared_columns = (numbers[:, None] for numbers in self._each(layout.nuisance, -1))
+        return np.concatenate([*points, *shared_columns], axis=1)
 
     def nuisance(self, state):
-        """Values (n,) of each of `nuisances`; 0 where a row has none."""
+        """Values (n,) of each of `nuisances`; 0 for rows without one."""
         return self._each(state.nuisance, 0.0)
 
-    def _each(self, of_all, none):
-        found = []
-        for of, number in self.nuisances:
-            values = of_all.get(of, ())
-            there = np.append(values, none) if len(values) else np.array([none])
-            found.append(there[getattr(self, number)])
-        return found
+    def _each(self, by_name, none):
+        """Values or columns (n,) of each of `nuisances`, or `none` for rows without one."""
+        columns = []
+        for name, number in self.nuisances:
+            values = by_name.get(name, ())
+            # The appended value is selected by number -1.
+            padded = np.append(values, none) if len(values) else np.array([none])
+            columns.append(padded[getattr(self, number)])
+        return columns
 
     def computed(self, state, derivatives):
-        """Computed values (n, m) and, if asked for, derivatives (n, m, K)."""
+        """Computed values (n, m) and, if requested, derivatives (n, m, K)."""
         raise NotImplementedError
 
     def undisturbed(self, state):
-        """The state in which misclosures that would feel a motion falsely are zero."""
+        """The state with zero misclosures for observations that would otherwise respond to a
+        motion."""
         return state
 
     def difference(self, computed):
@@ -236,13 +249,15 @@ class Observations:
         return computed - np.asarray(self.value).reshape(computed.shape)
 
     def part(self, rows):
-        """What fills some of the rows alone, a slice of them, see `fill`."""
+        """The `fill` method for a slice of the rows."""
         return self.taken(rows, trace=None).fill
 
     def fill(self, state, w, jac):
-        """Whitened misclosures into w (n, m), derivatives into jac (n, m, K) unless it is empty."""
-        wanted = len(jac) > 0
-        computed, derivatives = self.computed(state, wanted)
+        """Write whitened misclosures to w (n, m) and derivatives to jac (n, m, K) unless it is
+        empty."""
+        with_derivatives = len(jac) > 0
+        computed, derivatives = self.computed(state, with_derivatives)
+        # Whitening: division by the sd gives rows with unit variance.
         np.multiply(self.difference(computed), self.weight, out=w)
-        if wanted:
+        if with_derivatives:
             np.multiply(derivatives, self.weight[:, :, None], out=jac)

@@ -1,4 +1,4 @@
-"""Control coordinates, height differences, plumb lines, and unknowns known beforehand."""
+"""Control coordinates, height differences, plumb lines, vectors, and weighted unknowns."""
 
 from dataclasses import dataclass, replace
 
@@ -32,20 +32,20 @@ class ControlCoordinates(Observations):
         return computed, _UNITS[self.axis, None] if derivatives else None
 
     def relative(self, centre):
-        """Coordinates relative to a centre (3,)."""
+        """The observations with coordinates relative to a centre (3,)."""
         return replace(self, value=self.value - centre[self.axis])
 
 
 @dataclass(frozen=True)
 class SystemCoordinates(Observations):
-    """Control coordinates (n,), m, in a further system with its own transformation
+    """Control coordinates (n,), m, in a further system with a transformation of its own.
 
         X_system = (1 + scale) R_system X + shift
 
     Attributes
     ----------
     point, axis : ndarray, shape (n,)
-        As for ControlCoordinates.
+        As in ControlCoordinates.
     system : ndarray, shape (n,)
     """
 
@@ -56,7 +56,7 @@ class SystemCoordinates(Observations):
     kind, ties, of_survey = "control coordinate of a further system", ("point",), False
 
     def columns(self, layout):
-        """Point (3), system (rotation 3, shift 3, scale)."""
+        """Columns of point (3), system (rotation 3, shift 3, scale)."""
         return np.hstack([super().columns(layout), layout.system[self.system]])
 
     def computed(self, state, derivatives):
@@ -69,24 +69,28 @@ class SystemCoordinates(Observations):
             return all_three[rows, self.axis, None], None
         jac = np.zeros((len(self), 3, 10))
         jac[:, :, :3] = m[:, None, None] * rotation
+        # A small rotation w moves the rotated vector r by w x r.
         x, y, z = (m[:, None] * turned).T
         jac[:, 0, 4], jac[:, 0, 5] = z, -y
         jac[:, 1, 3], jac[:, 1, 5] = -z, x
         jac[:, 2, 3], jac[:, 2, 4] = y, -x
         jac[:, :, 6:9] = np.eye(3)
+        # The derivative by the scale is the rotated vector itself.
         jac[:, :, 9] = turned
         return all_three[rows, self.axis, None], jac[rows, self.axis][:, None, :]
 
 
 @dataclass(frozen=True)
 class _Differences(Observations):
+    """Differences of coordinates of two points."""
+
     start: np.ndarray
     end: np.ndarray
 
     ties = ("start", "end")
 
     def columns(self, layout):
-        """Point end (3), point start (3)."""
+        """Columns of point end (3), point start (3)."""
         return np.hstack([layout.points[self.end], layout.points[self.start]])
 
 
@@ -96,8 +100,9 @@ class HeightDifferences(_Differences):
 
     Parameters
     ----------
-    value, sd : (n,) arrays, m
-    start, end : (n,) arrays of int
+    value, sd : ndarray, shape (n,)
+        m.
+    start, end : ndarray of int, shape (n,)
         Points.
     """
 
@@ -107,23 +112,24 @@ class HeightDifferences(_Differences):
     def computed(self, state, derivatives):
         """The differences (n, 1)."""
         computed = state.xyz_m[self.end, 2:] - state.xyz_m[self.start, 2:]
+        # Derivatives by x, y, z of end, then of start.
         row = np.array([0.0, 0, 1, 0, 0, -1])
         return computed, np.tile(row, (len(self), 1, 1)) if derivatives else None
 
     def off_frame(self, d):
-        """Misfits in metres, a list of (n,), of differences d (n, 3) of the ends."""
+        """Misfits in metres, a list of (n,), from differences d (n, 3) of the ends."""
         return [d[:, 2] - self.value]
 
 
 @dataclass(frozen=True)
 class PlumbLines(_Differences):
-    """Pairs of points on one vertical: x and y of `end` minus those of `start` are zero.
+    """Pairs of points on a vertical: x and y of `end` and `start` are equal.
 
     Parameters
     ----------
-    value, sd : (n, 2) arrays, m
-        Zeros, and the sd in x and in y.
-    start, end : (n,) arrays of int
+    value, sd : ndarray, shape (n, 2)
+        Zeros, and the sd in x and in y, m.
+    start, end : ndarray of int, shape (n,)
         Points.
     """
 
@@ -132,15 +138,17 @@ class PlumbLines(_Differences):
     def computed(self, state, derivatives):
         """Differences in x and y (n, 2)."""
         computed = state.xyz_m[self.end, :2] - state.xyz_m[self.start, :2]
+        # Only x and y enter: first two rows of I and -I.
         rows = np.hstack([np.eye(2, 3), -np.eye(2, 3)])
         return computed, np.tile(rows, (len(self), 1, 1)) if derivatives else None
 
     def off_frame(self, d):
-        """Misfits in metres, a list of (n,), of differences d (n, 3) of the ends."""
+        """Misfits in metres, a list of (n,), from differences d (n, 3) of the ends."""
         return [d[:, 0], d[:, 1]]
 
     def undisturbed(self, state):
-        """Plumb: an oblique pair would pretend to know the rotation about the vertical."""
+        """The state with vertical plumb lines: an oblique one would seem to determine the
+        azimuth."""
         xyz = state.xyz_m.copy()
         xyz[self.end, :2] = xyz[self.start, :2]
         return replace(state, xyz_m=xyz)
@@ -152,8 +160,9 @@ class Vectors(_Differences):
 
     Parameters
     ----------
-    value, sd : (n, 3) arrays, m
-    start, end : (n,) arrays of int
+    value, sd : ndarray, shape (n, 3)
+        m.
+    start, end : ndarray of int, shape (n,)
         Points.
     """
 
@@ -168,14 +177,14 @@ class Vectors(_Differences):
 
 @dataclass(frozen=True)
 class KnownUnknowns(Observations):
-    """Unknowns with a value and an sd known beforehand: interior parameters, scales, offsets.
+    """Unknowns with an a priori value and sd: interior parameters, scales, offsets.
 
     Attributes
     ----------
     of : str
         "interior" or "system_scale", fields of State, or a name of NUISANCES.
     index : ndarray, shape (n,)
-        Place in that field.
+        Index in that field.
     """
 
     of: str
@@ -184,7 +193,7 @@ class KnownUnknowns(Observations):
     kind, unit = "weighted unknown", "its own"
 
     def columns(self, layout):
-        """The unknown itself."""
+        """Column of the unknown."""
         if self.of == "system_scale":
             return layout.system[self.index, 6:]
         columns = layout.interior if self.of == "interior" else layout.nuisance[self.of]

@@ -1,7 +1,7 @@
-"""Observations that are correlated with one another: they enter the adjustment as one.
+"""Correlated observations, which enter the adjustment as a single observation.
 
-Values l with the covariance Q = L L' are whitened together: L^-1 (computed - observed) has the
-covariance I, and so have the rows that the solver sees. Source: Koch 1999, section 3.2.
+Values l with covariance Q = L L' are whitened together: L^-1 (computed - observed) has covariance
+I, as have the rows in the solver. Source: Koch 1999, section 3.2.
 """
 
 from dataclasses import dataclass, field
@@ -14,12 +14,12 @@ from tankcal.survey.observations.base import Observations
 
 @dataclass(frozen=True)
 class Block:
-    """Values of a survey that are correlated.
+    """Correlated values of a survey.
 
     Attributes
     ----------
     source, row, component : ndarray, shape (m,)
-        Number of their table in Survey.observations, row there, value.
+        Number of the table in Survey.observations, row, and value in the row.
     covariance : ndarray, shape (m, m)
     """
 
@@ -36,10 +36,10 @@ class Correlated(Observations):
     Attributes
     ----------
     parts : tuple
-        Tuple of (observations of one kind, (k,) component of each), m in all.
+        Pairs (observations of one kind, component (k,) of each), m in all.
     covariance : ndarray, shape (m, m)
-    all_of
-        Layout in which every unknown, also what is fixed, has a number of its own.
+    all_of : Layout
+        Layout in which each unknown, fixed or not, has its own number.
     """
 
     parts: tuple
@@ -49,14 +49,15 @@ class Correlated(Observations):
     kind, shared = "correlated observations", ("covariance",)
 
     def __post_init__(self):
-        slots = [one.columns(self.all_of) for one, _ in self.parts]
+        slots = [observations.columns(self.all_of) for observations, _ in self.parts]
+        # Several values share unknowns: each unknown has one column in the block.
         _, first, place = np.unique(
             np.concatenate([part.ravel() for part in slots]), return_index=True, return_inverse=True
         )
         cuts = np.cumsum([part.size for part in slots])[:-1]
         places = [
-            mine.reshape(part.shape)
-            for mine, part in zip(np.split(place.ravel(), cuts), slots, strict=True)
+            places_of_part.reshape(part.shape)
+            for places_of_part, part in zip(np.split(place.ravel(), cuts), slots, strict=True)
         ]
         object.__setattr__(self, "_first", first)
         object.__setattr__(self, "_places", places)
@@ -64,32 +65,34 @@ class Correlated(Observations):
 
     @property
     def rows(self):
-        """m."""
+        """Number of values, m."""
         return len(self.covariance)
 
     def columns(self, layout):
-        """(1, K) column of each unknown that some of the values speak of."""
-        columns = [one.columns(layout).ravel() for one, _ in self.parts]
+        """Columns (1, K) of the unknowns of all values."""
+        columns = [observations.columns(layout).ravel() for observations, _ in self.parts]
         return np.concatenate(columns)[self._first][None]
 
     def whitened(self, values):
         """L^-1 times values (m, ...)."""
+        # Solving with L is more accurate than multiplying by its inverse.
         return scipy.linalg.solve_triangular(self._root, values, lower=True)
 
     def linearised(self, state):
         """Misclosures (m,) and derivatives (m, K), not whitened."""
         off, jac = [], []
-        for (one, component), places in zip(self.parts, self._places, strict=True):
-            rows = np.arange(len(one))
-            computed, derivatives = one.computed(state, True)
-            off.append(one.difference(computed)[rows, component])
-            found = np.zeros((len(one), len(self._first)))
-            np.add.at(found, (rows[:, None], places), derivatives[rows, component])
-            jac.append(found)
+        for (observations, component), places in zip(self.parts, self._places, strict=True):
+            rows = np.arange(len(observations))
+            computed, derivatives = observations.computed(state, True)
+            off.append(observations.difference(computed)[rows, component])
+            rows_of_part = np.zeros((len(observations), len(self._first)))
+            np.add.at(rows_of_part, (rows[:, None], places), derivatives[rows, component])
+            jac.append(rows_of_part)
         return np.concatenate(off), np.vstack(jac)
 
     def fill(self, state, w, jac):
-        """Whitened misclosures into w (1, m), derivatives into jac (1, m, K) unless it is empty."""
+        """Write whitened misclosures to w (1, m) and derivatives to jac (1, m, K) unless it is
+        empty."""
         off, derivatives = self.linearised(state)
         w[0] = self.whitened(off)
         if len(jac):

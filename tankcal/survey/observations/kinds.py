@@ -1,8 +1,8 @@
-"""Which observations each table of readings holds: the one place where a table meets its class.
+"""Assignment of a class of observations to each table of readings.
 
-A further kind of observation is a class with its equation and derivatives, a line here, and the
-columns of its table in the contract of the job. What its rows carry besides both ends follows from
-the fields of the class: `instrument`, `set`, `origin`, `horizontal`, `rise_m`, `bend_per_m`.
+A further kind of observation requires a class with its equation and derivatives, a line here, and
+the columns of its table in the contract of the job. Additional data of a row follow from the fields
+of the class: `instrument`, `set`, `origin`, `horizontal`, `rise_m`, `bend_per_m`.
 """
 
 from dataclasses import dataclass, field
@@ -19,18 +19,18 @@ from tankcal.survey.observations.sights import (
 
 @dataclass(frozen=True)
 class Kind:
-    """What the rows of one table are.
+    """Kind of observation in one table.
 
     Attributes
     ----------
     observes : type
         Class of the observations.
     options : dict
-        That it is made with.
+        Keyword arguments of the class.
     group : str
-        Under which their sds are judged together, where no instrument is named.
+        Group for the test of their standard deviations, if no instrument is named.
     either_way : bool
-        True: read from one end to the other or back is the same.
+        True: the reading is the same in both directions.
     """
 
     observes: type
@@ -40,22 +40,23 @@ class Kind:
 
     @property
     def is_angle(self):
-        """True where a full turn is no difference."""
+        """True if values that differ by a full turn are equal."""
         return self.observes.unit == "rad"
 
     @property
     def elements(self):
-        """Names of the values of a row; ("",) of a single one."""
+        """Names of the values of a row; ("",) for a single value."""
         return ("x", "y", "z")[: self.observes.rows] if self.observes.rows > 1 else ("",)
 
     @property
     def axes(self):
-        """Axes of the points' coordinates that enter, "xyz"; heights, unless a row is in plan."""
+        """Axes of the coordinates in the equation, "xyz", including heights unless a row is
+        horizontal."""
         axes = (0, 1, 2) if self.has("horizontal") else self.observes.axes
         return "".join("xyz"[axis] for axis in axes)
 
     def has(self, name):
-        """Whether its observations have a field `name`."""
+        """Whether the class has a field `name`."""
         return name in self.observes.__dataclass_fields__
 
 

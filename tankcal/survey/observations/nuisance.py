@@ -1,9 +1,9 @@
-"""Unknowns that observations share besides points and photos: scales, offsets, orientations.
+"""Unknowns shared by observations, besides points and photos: scales, offsets, orientations.
 
-A further one needs a line in NUISANCES, its values and sds in `Survey.nuisances`, and a pair in
-`nuisances` of each class of observations that it enters: its name here, and the field with the
-number of each row's own one. Layout, State, start, names, sds known beforehand and the datum
-follow from these.
+A further unknown requires a line in NUISANCES, values and sds in `Survey.nuisances`, and a pair in
+`nuisances` of each class of observations that contains it: its name here, and the field with the
+number for each row. Layout, State, start values, names, a priori sds and the datum follow from
+these.
 """
 
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Nuisance:
-    """What a name of NUISANCES stands for.
+    """Properties of a name of NUISANCES.
 
     Attributes
     ----------
     element, unit : str
-        As the user calls it.
+        Name and unit in messages.
     file : str
-        In which its value and sd known beforehand stand.
+        File of its a priori value and sd.
     by_turn : float
-        What it changes by when the whole survey turns by one rad about Z.
+        Change per rad of a rotation of the whole survey about Z.
     is_scale : bool
-        True: 1 + value is divided by what the whole survey is stretched by.
+        True: a scaling of the whole survey divides 1 + value.
     """
 
     element: str
@@ -34,12 +34,12 @@ class Nuisance:
     is_scale: bool = False
 
     def ways(self, value):
-        """Derivatives (k, 7) of values (k,) by the seven ways of `network.datum`."""
-        found = np.zeros((len(value), 7))
-        found[:, 5] = self.by_turn
+        """Derivatives (k, 7) of values (k,) by the seven motions of `network.datum`."""
+        derivatives = np.zeros((len(value), 7))
+        derivatives[:, 5] = self.by_turn
         if self.is_scale:
-            found[:, 6] = -(1.0 + value)
-        return found
+            derivatives[:, 6] = -(1.0 + value)
+        return derivatives
 
 
 NUISANCES = {

@@ -1,13 +1,13 @@
-"""What photographs observe: image coordinates, and the exterior orientation known beforehand.
+"""Observations of photographs: image coordinates, and a priori exterior orientation.
 
-Elements of the orientation with an sd of zero hold exactly. Their rows are not divided by an sd;
-single angles are written so that they stay sound up to phi = 90 deg. With the rotation
+Elements of the orientation with an sd of zero hold exactly. Their rows are not divided by an sd.
+Single angles are written so that their equations remain valid up to phi = 90 deg. With the rotation
 R = R3(kappa) R2(phi) R1(omega), rows counted from 0,
 
     omega0     -R21 cos(omega0) - R22 sin(omega0) = cos(phi) sin(omega - omega0) = 0
     kappa0     -R10 cos(kappa0) - R00 sin(kappa0) = cos(phi) sin(kappa - kappa0) = 0
     phi0       phi - phi0 = 0, at +-90 deg  R00 = R10 = 0
-    all three  rotation vector from R0 = 0 (tests of the three are then about the camera's axes)
+    all three  rotation vector from R0 = 0 (tests of the three then refer to the camera axes)
 """
 
 from dataclasses import dataclass, replace
@@ -26,29 +26,29 @@ from tankcal.geometry.rotations import (
 )
 from tankcal.survey.observations.base import Observations
 
-UPRIGHT = 1e-6  # rad from 90 deg: phi is then no angle any more but a direction
+UPRIGHT = 1e-6  # rad from 90 deg: phi is then a direction, not an angle
 OMEGA, PHI, KAPPA, ACROSS, ALONG, VECTOR = 3, 4, 5, 6, 7, 8  # rows of HeldOrientation
 
 
 @dataclass(frozen=True)
 class ImageCoordinates(Observations):
-    """Measured image coordinates (n, 2), mm: what a photo shows of a point.
+    """Measured image coordinates (n, 2), mm.
 
     With (u, v, w) = R (X - X0) the ideal image is (-c u / w, -c v / w); the distortion of the
-    camera moves it as its `form` says. A `Survey` has those of all cameras in one table; the solver
-    has one for each form of camera, with the interior parameters that take part.
+    camera moves it according to its `form`. A `Survey` has one table for all cameras; the solver
+    has one table for each form of camera, with the interior parameters in use.
 
     Attributes
     ----------
     value, sd : ndarray, shape (n, 2)
-        x to the right and y up from the middle of the format, mm.
+        x to the right and y upwards from the centre of the format, mm.
     point, photo : ndarray of int, shape (n,)
     form : tankcal.camera.model.Form
-        Of the distortion; None: not told apart yet.
+        Form of the distortion; None: not split by form yet.
     active : ndarray of int, shape (k,)
-        Places in PARAMETERS of the parameters that are not left out.
+        Indices in PARAMETERS of the parameters in use.
     interior_of : ndarray of int, shape (photos, 13)
-        Place of each photo's parameters in State.interior.
+        Indices of the parameters of each photo in State.interior.
     """
 
     point: np.ndarray
@@ -61,13 +61,13 @@ class ImageCoordinates(Observations):
     feels_datum, shared = False, ("active", "interior_of")
 
     def columns(self, layout):
-        """Point (3), photo (6), interior parameters (k)."""
+        """Columns of point (3), photo (6), interior parameters (k)."""
         interior = layout.interior[self.interior_of[:, self.active]]
         of_photo = np.concatenate([layout.photos, interior], axis=1).astype(np.int32)
-        found = np.empty((len(self), 3 + of_photo.shape[1]), dtype=np.int32)
-        found[:, :3] = layout.points.take(self.point, axis=0)
-        found[:, 3:] = of_photo.take(self.photo, axis=0)
-        return found
+        numbers = np.empty((len(self), 3 + of_photo.shape[1]), dtype=np.int32)
+        numbers[:, :3] = layout.points.take(self.point, axis=0)
+        numbers[:, 3:] = of_photo.take(self.photo, axis=0)
+        return numbers
 
     def computed(self, state, derivatives):
         """Image coordinates (n, 2) in mm and their derivatives."""
@@ -77,13 +77,15 @@ class ImageCoordinates(Observations):
             self._rows(state, np.zeros_like(w), np.ones_like(w), w, jac)
             return w, jac
         self._rows(state, self.value, np.ones_like(w), w, jac)
-        return w + self.value, jac  # the misclosure of the ideal image, as if of the measured
+        # The misclosure of the ideal image takes the place of that of the measured image.
+        return w + self.value, jac
 
     def fill(self, state, w, jac):
-        """Whitened misclosures and derivatives, without arrays in between."""
+        """Write whitened misclosures and derivatives without intermediate arrays."""
         self._rows(state, self.value, self.weight, w, jac)
 
     def _rows(self, state, value, weight, w, jac):
+        """Call the kernel for misclosures and derivatives of all rows."""
         of_ideal = self.form.convention == "distortion_of_ideal"
         image_rows(
             state.xyz_m, state.photo_xyz_m, state.rotation, state.interior[self.interior_of],
@@ -94,7 +96,7 @@ class ImageCoordinates(Observations):
 
 @dataclass(frozen=True)
 class PhotoOrientation(Observations):
-    """Single elements of the exterior orientation known beforehand.
+    """Single elements of the exterior orientation with a priori values.
 
     Attributes
     ----------
@@ -109,7 +111,7 @@ class PhotoOrientation(Observations):
     kind, unit = "exterior orientation", "m or rad"
 
     def columns(self, layout):
-        """Photo (6)."""
+        """Columns of the photo (6)."""
         return layout.photos[self.photo]
 
     def computed(self, state, derivatives):
@@ -124,39 +126,41 @@ class PhotoOrientation(Observations):
         return all_six[rows, self.element, None], jac[rows, self.element][:, None, :]
 
     def difference(self, computed):
-        """Computed minus observed; angles by the shorter way round."""
-        found = super().difference(computed)
+        """Computed minus observed; angles reduced to -pi to pi."""
+        misclosure = super().difference(computed)
         angle = np.asarray(self.element) > 2
-        found[angle] = np.angle(np.exp(1j * found[angle]))
-        return found
+        # The argument of exp(i x) is x reduced to one turn.
+        misclosure[angle] = np.angle(np.exp(1j * misclosure[angle]))
+        return misclosure
 
     def relative(self, centre):
-        """Projection centres relative to a centre (3,)."""
+        """The observations with projection centres relative to a centre (3,)."""
         return replace(self, value=self.value - np.append(centre, np.zeros(3))[self.element])
 
     def conditions(self):
-        """Elements that hold exactly, see above."""
+        """Exact elements as conditions, see the module docstring."""
         return _held_elements(self)
 
 
 @dataclass(frozen=True)
 class PhotoRotation(Observations):
-    """Whole rotations known beforehand, for photos of which all three angles are.
+    """Complete rotations with a priori values, for photos with three known angles.
 
-    The misclosure is the small rotation vector from the known rotation, with the covariance that
-    the sds of the angles give it there: no angle of the rotation that is being adjusted is needed.
-    Near phi = 90 deg omega and kappa turn about the same axis, and their sds say nothing about a
-    third one: no direction is held tighter than a tenth of the smallest sd.
+    The misclosure is the small rotation vector from the known rotation. Its covariance follows from
+    the standard deviations of the angles at the known rotation, so that no angle of the adjusted
+    rotation is needed. Near phi = 90 deg omega and kappa rotate about the same axis, and their sds
+    do not determine a third axis. No direction is therefore held tighter than a tenth of the
+    smallest sd.
 
     Attributes
     ----------
     value : ndarray, shape (n, 3)
         Zeros.
     sd : ndarray, shape (n, 3)
-        Rad, of omega, phi, kappa.
+        Of omega, phi, kappa, rad.
     photo : ndarray, shape (n,)
     rotation : ndarray, shape (n, 3, 3)
-        Known.
+        Known rotations.
     """
 
     photo: np.ndarray
@@ -165,34 +169,36 @@ class PhotoRotation(Observations):
     kind, unit, rows = "photo rotation", "rad", 3
 
     def columns(self, layout):
-        """Photo's rotation (3)."""
+        """Columns of the rotation of the photo (3)."""
         return layout.photos[self.photo, 3:]
 
     def computed(self, state, derivatives):
-        """Rotation vectors (n, 3) from the known rotations, in the camera's frame."""
+        """Rotation vectors (n, 3) from the known rotations, in the frame of the camera."""
         away = rotation_vector(state.rotation[self.photo] @ self.rotation.transpose(0, 2, 1))
         return away, vector_derivatives(away) if derivatives else None
 
     @cached_property
     def whitener(self):
-        """(n, 3, 3) inverse roots of the covariance of the rotation vectors."""
+        """Inverse roots (n, 3, 3) of the covariance of the rotation vectors."""
         turns = angle_axes(self.rotation)
+        # Each angle rotates about its own axis: covariance = sum of s^2 a a' over the three axes.
         covariance = np.einsum("nij,nj,nkj->nik", turns, np.square(self.sd), turns)
         variances, axes = np.linalg.eigh(covariance)
+        # (0.1 smallest sd)^2, the limit stated above.
         floor = 0.01 * np.square(self.sd).min(axis=1, keepdims=True)
         share = 1.0 if self.use is None else np.sqrt(self.use)[:, None]
         root = share / np.sqrt(np.maximum(variances, floor))
         return root[:, :, None] * axes.transpose(0, 2, 1)
 
     def fill(self, state, w, jac):
-        """Whitened misclosures and derivatives."""
+        """Write whitened misclosures and derivatives."""
         away, derivatives = self.computed(state, len(jac) > 0)
         w[:] = np.einsum("nij,nj->ni", self.whitener, away)
         if len(jac):
             jac[:] = self.whitener @ derivatives
 
     def conditions(self):
-        """Rotations that hold exactly: three rows of each."""
+        """Exact rotations as conditions, three rows each."""
         n = len(self)
         row = np.tile(VECTOR + np.arange(3), n)
         rotation, photo = np.repeat(self.rotation, 3, axis=0), np.repeat(self.photo, 3)
@@ -201,7 +207,7 @@ class PhotoRotation(Observations):
 
 @dataclass(frozen=True)
 class HeldOrientation(Observations):
-    """Elements of the exterior orientation that hold exactly; value in m (relative) or rad.
+    """Exact elements of the exterior orientation; value in m (relative) or rad.
 
     Attributes
     ----------
@@ -210,7 +216,7 @@ class HeldOrientation(Observations):
         0 1 2 for x, y, z, 3 4 5 for omega, phi, kappa, 6 7 for phi at +-90 deg, 8 9 10 for the
         rotation vector from `rotation`.
     rotation : ndarray, shape (n, 3, 3)
-        Known, of rows 8 to 10.
+        Known rotation, for rows 8 to 10.
     """
 
     photo: np.ndarray
@@ -220,7 +226,7 @@ class HeldOrientation(Observations):
     kind, unit = "exterior orientation", "m or rad"
 
     def columns(self, layout):
-        """Photo (6)."""
+        """Columns of the photo (6)."""
         return layout.photos[self.photo]
 
     def computed(self, state, derivatives):
@@ -232,6 +238,7 @@ class HeldOrientation(Observations):
         jac[place, 0, self.row[place]] = 1.0
         for row, (i, a), (j, b) in ((OMEGA, (2, 1), (2, 2)), (KAPPA, (1, 0), (0, 0))):
             here = np.flatnonzero(self.row == row)
+            # The equations of omega and kappa are linear in two elements of R.
             first, by_first = _element(r[here], i, a)
             second, by_second = _element(r[here], j, b)
             cos, sin = np.cos(value[here]), np.sin(value[here])
@@ -251,35 +258,39 @@ class HeldOrientation(Observations):
         return (off + value)[:, None], jac if derivatives else None
 
     def lever(self, state):
-        """cos(phi) for omega and kappa, else 1."""
-        found = super().lever(state)
+        """cos(phi) for omega and kappa, otherwise 1."""
+        levers = super().lever(state)
         turning = (self.row == OMEGA) | (self.row == KAPPA)
         phi = angles_of(state.rotation[self.photo[turning]])[:, 1]
-        found[turning] = np.cos(phi)[:, None]
-        return found
+        levers[turning] = np.cos(phi)[:, None]
+        return levers
 
 
 def _element(rotation, i, j):
     """Element (n,) of rotation matrices, and its derivatives (n, 3) by a small rotation d x R."""
-    value, by = rotation[:, i, j], np.zeros((len(rotation), 3))
+    value, derivatives = rotation[:, i, j], np.zeros((len(rotation), 3))
     k, l = (i + 1) % 3, (i + 2) % 3
-    by[:, k], by[:, l] = rotation[:, l, j], -rotation[:, k, j]
-    return value, by
+    derivatives[:, k], derivatives[:, l] = rotation[:, l, j], -rotation[:, k, j]
+    return value, derivatives
 
 
 def _held(value, photo, row, rotation):
+    """HeldOrientation with unit standard deviations."""
     return HeldOrientation(value, np.ones(len(value)), photo=photo, row=row, rotation=rotation)
 
 
 def _held_elements(one):
+    """Exact elements as HeldOrientation, and the observation number of each row."""
     value, row = np.array(one.value, dtype=float), np.array(one.element)
     rotation = np.tile(np.eye(3), (len(one), 1, 1))
     for photo in np.unique(one.photo):
-        mine = np.flatnonzero((one.photo == photo) & (row > 2))
-        if len(mine) == 3 and len(np.unique(row[mine])) == 3:
-            rotation[mine] = rotation_of_angles(*value[mine[np.argsort(row[mine])]])
-            row[mine], value[mine] = row[mine] + VECTOR - OMEGA, 0.0
+        angles = np.flatnonzero((one.photo == photo) & (row > 2))
+        if len(angles) == 3 and len(np.unique(row[angles])) == 3:
+            # Three exact angles of a photo are one exact rotation.
+            rotation[angles] = rotation_of_angles(*value[angles[np.argsort(row[angles])]])
+            row[angles], value[angles] = row[angles] + VECTOR - OMEGA, 0.0
     numbers = np.arange(len(one))
+    # At phi = +-90 deg the derivative of phi is singular; two conditions replace it.
     upright = np.flatnonzero((row == PHI) & (np.abs(np.abs(value) - np.pi / 2) < UPRIGHT))
     value[upright], row[upright] = 0.0, ACROSS
     numbers = np.concatenate([numbers, upright])

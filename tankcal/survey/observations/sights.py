@@ -1,11 +1,11 @@
 """Distances, angles and directions between points: tapes, levels, theodolites, total stations.
 
-From `start` (plus the instrument's height) to `end` (plus the target's height), with (x, y, z) the
-difference, p2 = x2 + y2 and s2 = p2 + z2:
+From `start` (plus height of the instrument) to `end` (plus height of the target), with (x, y, z)
+the difference, p2 = x2 + y2 and s2 = p2 + z2:
 
     azimuth atan2(x, y)     height angle atan2(z, p)     zenith angle pi/2 - that     distance s
 
-Azimuths count clockwise from +y. Derivatives by `start` are those by `end` with the other sign.
+Azimuths are clockwise from +y. Derivatives by `start` are the negative derivatives by `end`.
 """
 
 from dataclasses import dataclass, field
@@ -34,7 +34,7 @@ class Sights(Observations):
     ties, places_points = ("end", "start"), True
 
     def line(self, state):
-        """Differences x, y, z (3, n)."""
+        """Differences x, y, z (3, n), end minus start, m."""
         d = (state.xyz_m[self.end] - state.xyz_m[self.start]).T
         if self.rise_m is not None:
             d[2] -= self.rise_m
@@ -42,7 +42,7 @@ class Sights(Observations):
 
     @staticmethod
     def of_ends(derivative):
-        """Derivatives (n, 1, 6) by end and start from those by the difference (3, n)."""
+        """Derivatives (n, 1, 6) by end and start from derivatives by the difference (3, n)."""
         d = np.stack(derivative, axis=-1)
         return np.concatenate([d, -d], axis=1)[:, None, :]
 
@@ -51,18 +51,20 @@ class Sights(Observations):
 class Distances(Sights):
     """Distances by tape, EDM or total station: (1 + scale) s + offset.
 
-    The derivatives by `end` are (1 + scale) (x, y, z) / s, by the scale s, by the offset 1.
+    The derivatives are (1 + scale) (x, y, z) / s by `end`, s by the scale, and 1 by the offset.
 
     Parameters
     ----------
-    value, sd : (n,) arrays, m
-    start, end : (n,) arrays of int
+    value, sd : ndarray, shape (n,)
+        m.
+    start, end : ndarray of int, shape (n,)
         Points.
-    instrument : (n,) array of int
-        Whose scale (without unit) and offset (m) hold; -1 for none.
+    instrument : ndarray of int, shape (n,)
+        Instrument of scale (without unit) and offset (m); -1 for none.
     horizontal : bool
-        True when heights do not enter: z = 0.
-    rise_m : (n,) array, m, optional
+        True: heights do not enter, z = 0.
+    rise_m : ndarray, shape (n,), optional
+        m.
     """
 
     instrument: np.ndarray
@@ -73,17 +75,18 @@ class Distances(Sights):
 
     @property
     def axes(self):
-        """Heights do not enter horizontal distances."""
+        """Coordinates in the equation; a horizontal distance does not depend on heights."""
         return (0, 1) if self.horizontal else (0, 1, 2)
 
     def without_derivatives(self, state):
-        """(n,) True where both ends are at one place; in plan, if the distance is horizontal."""
+        """Mask (n,), True where both ends coincide; in plan, if the distance is horizontal."""
         x, y, z = self.line(state)
         return (x == 0) & (y == 0) & (self.horizontal | (z == 0))
 
     def computed(self, state, derivatives):
         """The readings (n, 1)."""
         d = self.line(state)
+        # Without the height difference the derivative by z vanishes as well.
         if self.horizontal:
             d[2] = 0.0
         s = np.sqrt(np.einsum("kn,kn->n", d, d))
@@ -92,26 +95,28 @@ class Distances(Sights):
         computed = (m * s + offset)[:, None]
         if not derivatives:
             return computed, None
-        found = np.ones((len(self), 1, 8))
-        found[:, 0, :3] = (m * d / s).T
-        found[:, 0, 3:6] = -found[:, 0, :3]
-        found[:, 0, 6] = s
-        return computed, found
+        jacobian = np.ones((len(self), 1, 8))
+        jacobian[:, 0, :3] = (m * d / s).T
+        jacobian[:, 0, 3:6] = -jacobian[:, 0, :3]
+        jacobian[:, 0, 6] = s
+        return computed, jacobian
 
 
 @dataclass(frozen=True)
 class _Angles(Sights):
+    """Sights with angles, in rad."""
+
     unit = "rad"
 
     def without_derivatives(self, state):
-        """(n,) True where both ends are at one place in plan: no angle has derivatives there."""
+        """Mask (n,), True where both ends coincide in plan, where no angle has derivatives."""
         x, y, _ = self.line(state)
         return (x == 0) & (y == 0)
 
     def difference(self, computed):
-        """Computed minus observed, by the shorter way round."""
-        found = super().difference(computed)
-        return found - 2 * np.pi * np.round(found / (2 * np.pi))
+        """Computed minus observed, reduced to -pi to pi."""
+        misclosure = super().difference(computed)
+        return misclosure - 2 * np.pi * np.round(misclosure / (2 * np.pi))
 
 
 def azimuth(x, y):
@@ -128,8 +133,9 @@ class Azimuths(_Angles):
 
     Parameters
     ----------
-    value, sd : (n,) arrays, rad
-    start, end : (n,) arrays of int
+    value, sd : ndarray, shape (n,)
+        rad.
+    start, end : ndarray of int, shape (n,)
         Points.
     """
 
@@ -142,24 +148,26 @@ class Azimuths(_Angles):
         return value[:, None], self.of_ends(derivative) if derivatives else None
 
     def off_frame(self, d):
-        """Misfits in metres, a list of (n,), of differences d (n, 3) of the ends."""
+        """Misfits in metres, a list of (n,), from differences d (n, 3) of the ends."""
+        # The angular misfit becomes a length across the line.
         away = np.hypot(d[:, 0], d[:, 1])
         return [d[:, 0] - away * np.sin(self.value), d[:, 1] - away * np.cos(self.value)]
 
 
 @dataclass(frozen=True)
 class Directions(_Angles):
-    """Directions read on a circle whose zero has an unknown azimuth: atan2(x, y) - orientation.
+    """Directions on a circle whose zero has an unknown azimuth: atan2(x, y) - orientation.
 
     The derivatives by `end` are those of an azimuth, by the orientation -1.
 
     Parameters
     ----------
-    value, sd : (n,) arrays, rad
-    start, end : (n,) arrays of int
+    value, sd : ndarray, shape (n,)
+        rad.
+    start, end : ndarray of int, shape (n,)
         Points.
-    set : (n,) array of int
-        The set of directions; each has its own orientation unknown (rad).
+    set : ndarray of int, shape (n,)
+        Set of directions; each has its own orientation unknown (rad).
     """
 
     set: np.ndarray
@@ -174,18 +182,20 @@ class Directions(_Angles):
         computed = (value - self.nuisance(state)[0])[:, None]
         if not derivatives:
             return computed, None
+        # The orientation enters with derivative -1.
         turn = np.full((len(self), 1, 1), -1.0)
         return computed, np.concatenate([self.of_ends(derivative), turn], axis=2)
 
 
 @dataclass(frozen=True)
 class HorizontalAngles(_Angles):
-    """Horizontal angles at `start`, clockwise from `origin` to `end`: difference of two azimuths.
+    """Horizontal angles at `start`, clockwise from `origin` to `end`: differences of azimuths.
 
     Parameters
     ----------
-    value, sd : (n,) arrays, rad
-    start, end, origin : (n,) arrays of int
+    value, sd : ndarray, shape (n,)
+        rad.
+    start, end, origin : ndarray of int, shape (n,)
         Points.
     """
 
@@ -194,7 +204,7 @@ class HorizontalAngles(_Angles):
     kind, ties, axes = "horizontal angle", ("end", "start", "origin"), (0, 1)
 
     def without_derivatives(self, state):
-        """(n,) True where the station is, in plan, where one of its targets is."""
+        """Mask (n,), True where the station coincides in plan with one of its targets."""
         back = state.xyz_m[self.origin, :2] == state.xyz_m[self.start, :2]
         return super().without_derivatives(state) | back.all(axis=1)
 
@@ -206,6 +216,7 @@ class HorizontalAngles(_Angles):
         second, of_second = azimuth(back[:, 0], back[:, 1])
         if not derivatives:
             return (first - second)[:, None], None
+        # The station enters both azimuths with negative sign, so its derivative is the difference.
         jac = np.concatenate([of_first, of_second - of_first, -of_second]).T[:, None, :]
         return (first - second)[:, None], jac
 
@@ -214,20 +225,23 @@ class HorizontalAngles(_Angles):
 class VerticalAngles(_Angles):
     """Vertical angles above the horizon, atan2(h, p), or from the zenith, pi/2 - atan2(h, p).
 
-    With h = z - bend p2 the target stands lower by the curvature of the earth, less refraction.
-    The derivatives by `end` are (a x / p, a y / p, p / s2), a = -h / s2 - 2 bend p2 / s2 and
-    s2 = p2 + h2; with the other sign from the zenith.
+    With h = z - bend p2 the target is lower by the curvature of the earth, less refraction. The
+    derivatives by `end` are (a x / p, a y / p, p / s2), with a = -h / s2 - 2 bend p2 / s2 and s2 =
+    p2 + h2; zenith angles have the opposite sign.
 
     Parameters
     ----------
-    value, sd : (n,) arrays, rad
-    start, end : (n,) arrays of int
+    value, sd : ndarray, shape (n,)
+        rad.
+    start, end : ndarray of int, shape (n,)
         Points.
     zenith : bool
-        True when they count from the zenith.
-    bend_per_m : float, 1/m
-        (1 - k) / (2 R) with the coefficient of refraction k; 0 leaves both out.
-    rise_m : (n,) array, m, optional
+        True: counted from the zenith.
+    bend_per_m : float
+        (1 - k) / (2 R) with the coefficient of refraction k, 1/m; 0: neither curvature nor
+        refraction.
+    rise_m : ndarray, shape (n,), optional
+        m.
     """
 
     zenith: bool = field(default=False, kw_only=True)
@@ -239,9 +253,11 @@ class VerticalAngles(_Angles):
         """The angles (n, 1)."""
         x, y, z = self.line(state)
         p2 = x * x + y * y
+        # Curvature lowers the target by bend p^2.
         p, z = np.sqrt(p2), z - self.bend_per_m * p2
         s2 = p2 + z * z
         value = np.arctan2(z, p)
+        # Derivatives of atan2(h, p) by z and p; h depends on p through the curvature.
         of_z, of_p = p / s2, -z / s2 - 2 * self.bend_per_m * p2 / s2
         sign = -1.0 if self.zenith else 1.0
         computed = (np.pi / 2 - value if self.zenith else value)[:, None]

@@ -1,4 +1,4 @@
-"""Where observations come from: rows of a file, by the names that the user gave."""
+"""Sources of observations: rows of a file, by the user's names."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,21 +8,21 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Source:
-    """What a user calls the N readings of a file.
+    """The N readings of a file, by the user's names.
 
     Attributes
     ----------
     file : str
     rows : tuple
-        (N,) rows of the file; (): they stand in no row.
+        (N,) rows of the file; (): no rows.
     ids : tuple
         (N,) tuples of names.
     element : tuple
-        (N,) tuples, a name for each value: ("x", "y"); ("",) where there is only one.
+        (N,) tuples of value names: ("x", "y"); ("",) for a single value.
     group : tuple
-        (N,) names of the groups whose sds are judged together, "tape 1"; (): of no group.
+        (N,) names of the groups whose standard deviations are tested together, "tape 1"; (): none.
     table : str
-        As `Readings` name it; "" for everything else.
+        As in `Readings`; "" for all other observations.
     """
 
     file: str
@@ -34,28 +34,28 @@ class Source:
 
     @cached_property
     def values(self):
-        """(N,) how many values each reading has."""
-        return np.array([len(one) for one in self.element], dtype=int)
+        """Number (N,) of values of each reading."""
+        return np.array([len(names) for names in self.element], dtype=int)
 
     def trace(self):
-        """The Trace of observations that are these readings, each on its own."""
+        """The Trace of observations that are these readings, without averaging."""
         n = len(self.ids)
         return Trace(self, np.arange(n), np.ones(n, dtype=int))
 
 
 @dataclass(frozen=True)
 class Trace:
-    """Of which readings n observations were made; it rides along on them.
+    """Readings from which n observations were made; selected together with them.
 
     Attributes
     ----------
     source : Source
     reading : ndarray of int, shape (n,)
-        Number there of the first reading of each observation.
+        Number in the source of the first reading of each observation.
     repeats : ndarray of int, shape (n,)
-        Readings that were averaged.
+        Number of readings averaged.
     scatter : ndarray, shape (n,)
-        Chi-square of these about their mean; None: none were averaged.
+        Chi-square of the readings about their mean; None: no averaging.
     """
 
     source: Source
@@ -64,13 +64,13 @@ class Trace:
     scatter: np.ndarray | None = None
 
     def taken(self, keep):
-        """The Trace of the observations `keep` (indices or a mask)."""
+        """The Trace of selected observations (indices or a mask)."""
         scatter = None if self.scatter is None else self.scatter[keep]
         return Trace(self.source, self.reading[keep], self.repeats[keep], scatter)
 
     @property
     def file(self):
-        """Its name."""
+        """Name of the file."""
         return self.source.file
 
     @property
@@ -80,31 +80,33 @@ class Trace:
 
     @cached_property
     def rows(self):
-        """(n,) row of the first reading of each observation, or None."""
+        """Row (n,) of the first reading of each observation, or None."""
         return self._each(self.source.rows, None)
 
     @cached_property
     def ids(self):
-        """(n,) tuples of names."""
+        """Tuples (n,) of names."""
         return self._each(self.source.ids)
 
     @cached_property
     def element(self):
-        """(n,) tuples of the names of the values."""
+        """Tuples (n,) of value names."""
         return self._each(self.source.element)
 
     @cached_property
     def group(self):
-        """(n,) names of groups."""
+        """Names (n,) of groups."""
         return self._each(self.source.group, "")
 
     def _each(self, names, missing=None):
+        """Names (n,) of the first reading of each observation."""
         if not names:
             return (missing,) * len(self.reading)
         return tuple(names[i] for i in self.reading.tolist())
 
     @property
     def repeated(self):
-        """(chi-square (n,), degrees of freedom (n,)) of the readings that were averaged."""
+        """Chi-square (n,) and degrees of freedom (n,) of the averaged readings."""
         scatter = np.zeros(len(self.reading)) if self.scatter is None else self.scatter
+        # k readings about their mean have k - 1 degrees of freedom per value.
         return scatter, (self.repeats - 1) * self.source.values[self.reading]

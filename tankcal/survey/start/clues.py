@@ -1,4 +1,4 @@
-"""How a piece of a survey grows by everything that was observed: photos, angles, tapes, levels."""
+"""Growth of a piece of a survey by all observations: photos, angles, tapes, levels."""
 
 from dataclasses import dataclass, field, replace
 from itertools import combinations
@@ -15,15 +15,24 @@ from tankcal.survey.start.plan_frames import find_plan_positions
 from tankcal.survey.start.polar import improved_in_plan
 from tankcal.survey.start.single_points import misfit_of_places, position_single_points
 
-AS_WELL = 1e-6  # of the extent: misfits this near to one another decide nothing
+AS_WELL = 1e-6  # share of the extent: misfits closer than this are equal
 
 
 @dataclass(frozen=True)
 class Clues:
-    """Everything that was observed, as the search for start values needs it.
+    """Observations in the form required by the search for start values.
 
-    trial   number of the attempt: other samples are drawn in another one
-    sought  what was found of single points already, see network.positioning
+    Attributes
+    ----------
+    survey : network.Survey
+    sights : tuple of Sight
+    plan : Plan
+    wall : Wall or None
+    rng : numpy.random.Generator
+    trial : int
+        Number of the attempt; each draws other samples.
+    sought : dict
+        Results for single points, see `single_points`.
     """
 
     survey: object
@@ -40,35 +49,46 @@ class Clues:
 
     @property
     def silent(self):
-        """True when nothing but photos (and coordinates) was observed."""
-        return not any(one.places_points for one in self.survey.observations)
+        """True if only photos (and coordinates) were observed."""
+        return not any(item.places_points for item in self.survey.observations)
 
 
 def grow_piece(clues, piece, least, free=False):
-    """The Piece with all that follows from it, by photos and by set-ups, in turn.
+    """Grow a piece by photos and by set-ups in turn until nothing is added.
 
-    least  known points that a photo must see
-    free   whether plan and heights may start in a frame of their own when nothing of them is known
+    Parameters
+    ----------
+    clues : Clues
+    piece : Piece
+    least : int
+        Known points required in a photo.
+    free : bool
+        Whether plan and heights without known values may start in a frame of their own.
+
+    Returns
+    -------
+    Piece
     """
     while True:
         before = np.isfinite(piece.xyz_m).sum() + piece.oriented.sum()
-        piece = _by_vectors(clues, piece, free)
-        piece = _by_tapes(clues, _surveyed(clues, piece, free), free)
+        piece = _add_by_vectors(clues, piece, free)
+        piece = _add_by_tapes(clues, _surveyed(clues, piece, free), free)
         wall = clues.wall or wall_of(piece.xyz_m)
         piece = grow_by_photos(clues.sights, piece, clues.rng, wall, least)
         if np.isfinite(piece.xyz_m).sum() + piece.oriented.sum() == before:
-            piece = _by_mixtures(clues, piece)
+            # Mixed observations are slow to solve, so they come last.
+            piece = _add_by_mixtures(clues, piece)
         if np.isfinite(piece.xyz_m).sum() + piece.oriented.sum() == before:
             return piece
 
 
-def _by_vectors(clues, piece, free):
-    """The Piece with points that hang on it by vectors, one after the other."""
-    groups = [one for one in clues.survey.observations if isinstance(one, Vectors) and len(one)]
+def _add_by_vectors(clues, piece, free):
+    """Add points tied to the Piece by vectors."""
+    groups = [item for item in clues.survey.observations if isinstance(item, Vectors) and len(item)]
     if not groups:
         return piece
     start, end, value = (
-        np.concatenate([getattr(one, name)[one.in_use] for one in groups])
+        np.concatenate([getattr(item, name)[item.in_use] for item in groups])
         for name in ("start", "end", "value")
     )
     xyz = piece.xyz_m.copy()
@@ -76,18 +96,18 @@ def _by_vectors(clues, piece, free):
         xyz[start[0]] = 0.0
     while True:
         before = np.isfinite(xyz).sum()
-        for sign, here, there in ((1.0, start, end), (-1.0, end, start)):
-            ahead = np.isfinite(xyz[here]) & np.isnan(xyz[there])
+        for sign, base, target in ((1.0, start, end), (-1.0, end, start)):
+            ahead = np.isfinite(xyz[base]) & np.isnan(xyz[target])
             row, axis = np.nonzero(ahead)
-            xyz[there[row], axis] = xyz[here[row], axis] + sign * value[row, axis]
+            xyz[target[row], axis] = xyz[base[row], axis] + sign * value[row, axis]
         if np.isfinite(xyz).sum() == before:
             break
     new = np.isfinite(xyz).all(axis=1) & ~piece.known
     return replace(piece, xyz_m=xyz, by_photos=piece.by_photos & ~new)
 
 
-def _by_mixtures(clues, piece):
-    """The Piece with points that only a mixture of readings to known ones fixes."""
+def _add_by_mixtures(clues, piece):
+    """Add points determined only by a mixture of readings to known points."""
     if clues.silent or not np.isfinite(piece.xyz_m).any():
         return piece
     xyz = position_single_points(clues.survey, clues.plan, piece.xyz_m, clues.sought)
@@ -96,25 +116,28 @@ def _by_mixtures(clues, piece):
 
 
 def _surveyed(clues, piece, free):
-    """The Piece with what angles, distances and levels say."""
+    """Add points from angles, distances and levels."""
     if clues.silent:
         return piece
-    xyz = _by_readings(clues, piece.xyz_m, free)
+    xyz = _place_by_readings(clues, piece.xyz_m, free)
     new = np.isfinite(xyz) & ~np.isfinite(piece.xyz_m)
     if not new.any():
         return piece
-    if np.isfinite(xyz[:, 2]).any():  # once more, with blunders outvoted
+    # Compute the new positions again from all their sights, so that blunders are outvoted.
+    if np.isfinite(xyz[:, 2]).any():
         xy = improved_in_plan(clues.plan, xyz[:, :2], xyz[:, 2], ~new[:, 0])
         first = np.where(new[:, 2], np.nan, xyz[:, 2])
         if not np.isfinite(first).any():
+            # Heights without a known value start from one of the computed heights.
             first[np.flatnonzero(new[:, 2])[0]] = xyz[np.flatnonzero(new[:, 2])[0], 2]
         better = add_heights(clues.survey, clues.plan, np.column_stack([xy, first]), False)
         xyz = np.where(np.isfinite(better), better, xyz)
     return replace(piece, xyz_m=xyz, by_photos=piece.by_photos & ~new.any(axis=1))
 
 
-def _by_readings(clues, xyz, free):
-    """Coordinates (points, 3) with all that plan and heights give, in turn."""
+def _place_by_readings(clues, xyz, free):
+    """Coordinates (points, 3) after alternating between plan and heights."""
+    # Slope distances need heights, and heights by slopes need distances.
     for _ in range(3):
         before = np.isfinite(xyz).sum()
         if free or np.isfinite(xyz[:, 0]).any():
@@ -126,8 +149,8 @@ def _by_readings(clues, xyz, free):
     return xyz
 
 
-def _by_tapes(clues, piece, free):
-    """The Piece with points that hang on it by spatial distances alone."""
+def _add_by_tapes(clues, piece, free):
+    """Add points tied to the Piece by spatial distances alone."""
     plan, known = clues.plan, piece.known
     straight = ~plan.flat & (plan.rise == 0) & ~(known[plan.start] & known[plan.end])
     if not straight.any() or not (free or known.any()) or len(plan.station):
@@ -136,10 +159,12 @@ def _by_tapes(clues, piece, free):
     firm = np.unique(np.concatenate([start, end]))
     firm = firm[known[firm]]
     sides = np.array(list(combinations(firm, 2)), dtype=int).reshape(-1, 2)
+    # Distances between known points stiffen the network.
     between = np.linalg.norm(piece.xyz_m[sides[:, 0]] - piece.xyz_m[sides[:, 1]], axis=1)
     ties = np.concatenate([start, sides[:, 0]]), np.concatenate([end, sides[:, 1]])
     for points, places in lay_out_networks(*ties, np.concatenate([length, between]), 3, clues.rng):
-        either = [_told(clues, points, places * mirror) for mirror in ([1, 1, 1], [1, 1, -1])]
+        # Distances do not determine the handedness, so both mirror images are tried.
+        either = [_piece_of(clues, points, places * mirror) for mirror in ([1, 1, 1], [1, 1, -1])]
         if free and not known.any():
             return piece.filled_from(either[0])
         joined = _joined(clues, piece, either)
@@ -149,30 +174,30 @@ def _by_tapes(clues, piece, free):
 
 
 def _joined(clues, piece, either):
-    """The Piece with one of two mirror images, the one that all readings speak for.
+    """Join the mirror image that agrees with the readings; None if neither or both do.
 
-    None where neither can be joined, or both fit as well: known points in one plane leave open on
-    which side of it the others lie.
+    Known points in one plane leave the side of the other points undetermined.
     """
-    motions = [joint(own, piece, clues.rng) for own in either]
-    found = []
-    for own, motion in zip(either, motions, strict=True):
+    motions = [joint(image, piece, clues.rng) for image in either]
+    candidates = []
+    for image, motion in zip(either, motions, strict=True):
         if motion is None:
             continue
-        filled = piece.filled_from(own.moved(motion))
+        filled = piece.filled_from(image.moved(motion))
         new = np.flatnonzero(filled.known & ~piece.known)
         misfit = misfit_of_places(clues.survey, clues.plan, filled.xyz_m, new)
-        found.append((misfit + motion.misfit_m, filled))
-    if not found:
+        candidates.append((misfit + motion.misfit_m, filled))
+    if not candidates:
         return None
-    found.sort(key=lambda one: one[0])
-    best = found[0]
-    if len(found) > 1 and found[1][0] - best[0] < AS_WELL * best[1].extent:
+    candidates.sort(key=lambda candidate: candidate[0])
+    best = candidates[0]
+    if len(candidates) > 1 and candidates[1][0] - best[0] < AS_WELL * best[1].extent:
         return None
     return best[1]
 
 
-def _told(clues, points, places):
+def _piece_of(clues, points, places):
+    """A Piece with places (k, 3) of some points."""
     piece = empty(clues.points, len(clues.sights))
     piece.xyz_m[points], piece.by_photos[points] = places, False
     return piece

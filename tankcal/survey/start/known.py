@@ -1,4 +1,4 @@
-"""What a survey knows of places before anything is computed: for certain, or only about."""
+"""Positions known before the computation: certain, or approximate."""
 
 from dataclasses import dataclass, replace
 
@@ -11,44 +11,44 @@ from tankcal.survey.start.pieces import Piece
 
 @dataclass(frozen=True)
 class Known:
-    """Places that are known, as a Piece; coordinates of points each on its own."""
+    """Known positions as a Piece; each coordinate of a point may be known separately."""
 
     piece: Piece
 
     @property
     def nothing(self):
-        """True when not a single coordinate or photo is known."""
+        """True if no coordinate and no photo is known."""
         return not (np.isfinite(self.piece.xyz_m).any() or self.piece.oriented.any())
 
-    def without(self, other):
-        """The same without points and photos of which the other one knows something."""
-        piece, told = self.piece, np.isfinite(other.piece.xyz_m).any(axis=1)
-        photos = other.piece.oriented
+    def without(self, reference):
+        """Omit points and photos known in another Known."""
+        piece, is_known = self.piece, np.isfinite(reference.piece.xyz_m).any(axis=1)
+        photos = reference.piece.oriented
         return Known(
             replace(
                 piece,
-                xyz_m=np.where(told[:, None], np.nan, piece.xyz_m),
-                by_photos=piece.by_photos | told,
+                xyz_m=np.where(is_known[:, None], np.nan, piece.xyz_m),
+                by_photos=piece.by_photos | is_known,
                 place_m=np.where(photos[:, None], np.nan, piece.place_m),
                 rotation=np.where(photos[:, None, None], np.nan, piece.rotation),
             )
         )
 
     def shifted(self, shift_m):
-        """The same in a frame that is shifted."""
+        """Shift the frame."""
         piece = self.piece
         return Known(replace(piece, xyz_m=piece.xyz_m + shift_m, place_m=piece.place_m + shift_m))
 
 
 def certain_places(survey):
-    """Known places that are fixed or observed, of points that something was measured to."""
+    """Known positions that are fixed or observed, of points with measurements."""
     xyz = np.full((len(survey.points), 3), np.nan)
     if survey.fixed is not None:
         xyz = np.where(survey.fixed & _measured(survey)[:, None], survey.xyz_m, xyz)
-    for one in survey.observations:
-        if isinstance(one, ControlCoordinates):
-            used = one.in_use
-            xyz[one.point[used], one.axis[used]] = one.value[used]
+    for item in survey.observations:
+        if isinstance(item, ControlCoordinates):
+            accepted = item.in_use
+            xyz[item.point[accepted], item.axis[accepted]] = item.value[accepted]
     photos = survey.photos
     if photos is None:
         return Known(_piece(xyz, np.zeros((0, 3)), np.zeros((0, 3, 3))))
@@ -56,26 +56,26 @@ def certain_places(survey):
     if photos.fixed is not None:
         place = np.where(photos.fixed[:, :3], photos.xyz_m, place)
         rotation = np.where(photos.fixed[:, 3, None, None], photos.rotation, rotation)
-    told = np.isfinite(angles).all(axis=1) & np.isnan(rotation).any(axis=(1, 2))
-    if told.any():
-        rotation[told] = rotation_of_angles(*angles[told].T)
+    has_angles = np.isfinite(angles).all(axis=1) & np.isnan(rotation).any(axis=(1, 2))
+    if has_angles.any():
+        rotation[has_angles] = rotation_of_angles(*angles[has_angles].T)
     return Known(_piece(xyz, place, rotation))
 
 
 def _photos_observed(survey):
-    """Places (n, 3), angles (n, 3) and rotations (n, 3, 3) of photos that were observed."""
+    """Observed positions (n, 3), angles (n, 3) and rotations (n, 3, 3) of photos."""
     n = len(survey.photos.names)
     six, rotation = np.full((n, 6), np.nan), np.full((n, 3, 3), np.nan)
-    for one in survey.observations:
-        if isinstance(one, PhotoOrientation):
-            six[one.photo, one.element] = one.value
-        elif isinstance(one, PhotoRotation):
-            rotation[one.photo] = one.rotation
+    for item in survey.observations:
+        if isinstance(item, PhotoOrientation):
+            six[item.photo, item.element] = item.value
+        elif isinstance(item, PhotoRotation):
+            rotation[item.photo] = item.rotation
     return six[:, :3], six[:, 3:], rotation
 
 
 def hinted_places(survey):
-    """All start values that were given, whatever they are worth, of points measured to."""
+    """All given start values, whatever their quality, of points with measurements."""
     photos, xyz = survey.photos, np.where(_measured(survey)[:, None], survey.xyz_m, np.nan)
     if photos is None:
         return Known(_piece(xyz, np.zeros((0, 3)), np.zeros((0, 3, 3))))
@@ -83,17 +83,18 @@ def hinted_places(survey):
 
 
 def _measured(survey):
-    """(points,) True for points that an image or an observation speaks of."""
-    found = np.zeros(len(survey.points), dtype=bool)
+    """Mask (points,) of points in an image or an observation."""
+    mask = np.zeros(len(survey.points), dtype=bool)
     if survey.image_points is not None:
-        found[survey.image_points.point] = True
-    for one in survey.observations:
-        for name in one.ties:
-            found[getattr(one, name)] = True
-    return found
+        mask[survey.image_points.point] = True
+    for item in survey.observations:
+        for name in item.ties:
+            mask[getattr(item, name)] = True
+    return mask
 
 
 def _piece(xyz_m, place_m, rotation):
+    """A Piece of known coordinates, projection centres and rotations."""
     by_photos = ~np.isfinite(xyz_m).any(axis=1)
     return Piece(
         np.array(xyz_m, dtype=float),

@@ -1,36 +1,44 @@
-"""Places from nothing but distances: shortest ways give all distances, these give the places.
+"""Positions from distances only: shortest paths complete the distance matrix, scaling solves it.
 
-Classical scaling of the matrix of shortest ways, then Gauss-Newton (damped) on the distances that
-were measured. Source: Torgerson 1952; Shang et al. 2003 (MDS-MAP).
+Classical scaling of the matrix of shortest paths gives a start for damped Gauss-Newton on the
+measured distances. Source: Torgerson 1952; Shang et al. 2003 (MDS-MAP).
 """
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, shortest_path
 
-MOST = 400  # points of one network by distances only
+MOST = 400  # points of a network of distances
 TRIES = 12
 STEPS = 80
 UNFOLDING = 10
-MISFIT = 0.01  # of the lengths, that most of them must keep
-LOOSE = 1e-5  # singular value, over the largest, of a motion that no distance feels
-FLAT = 1e-2  # neighbours thinner than that share of their extent lie on a line or in a plane
+MISFIT = 0.01  # relative misfit that most distances must meet
+LOOSE = 1e-5  # relative singular value of a motion that no distance determines
+FLAT = 1e-2  # relative thickness below which neighbours lie on a line or in a plane
 
 
 def lay_out_networks(low, high, length, dims, rng):
-    """Networks by distances: yields points (k,) and places (k, dims) of each rigid one.
+    """Yield points (k,) and places (k, dims) of each rigid network of distances.
 
-    low, high, length  (n,) points and m        dims  2 or 3
+    The places have a frame of their own and may be mirrored. Points whose neighbours lie on a line
+    (in a plane) could be reflected and are omitted.
 
-    Places come in a frame of their own, and may be mirrored. Points that could be folded over,
-    because their neighbours lie on a line (in a plane), are left out.
+    Parameters
+    ----------
+    low, high : ndarray of int, shape (n,)
+        Points of each distance.
+    length : ndarray, shape (n,)
+        Distances, m.
+    dims : int
+        2 or 3.
+    rng : numpy.random.Generator
     """
     points, ends = np.unique(np.concatenate([low, high]), return_inverse=True)
     a, b = ends[: len(low)], ends[len(low) :]
     graph = coo_array((length, (a, b)), shape=(len(points),) * 2)
     count, label = connected_components(graph, directed=False)
-    for one in range(count):
-        nodes = np.flatnonzero(label == one)
+    for network in range(count):
+        nodes = np.flatnonzero(label == network)
         if not dims < len(nodes) <= MOST:
             continue
         nodes = _well_tied(nodes, a, b, dims)
@@ -39,30 +47,33 @@ def lay_out_networks(low, high, length, dims, rng):
             continue
         place = np.full(len(points), -1)
         place[nodes] = np.arange(len(nodes))
-        found = _solved(place[a[rows]], place[b[rows]], length[rows], len(nodes), dims, rng)
-        if found is not None:
-            firm = _firm(found, place[a[rows]], place[b[rows]], dims)
-            yield points[nodes[firm]], found[firm]
+        places = _solved(place[a[rows]], place[b[rows]], length[rows], len(nodes), dims, rng)
+        if places is not None:
+            firm = _firm(places, place[a[rows]], place[b[rows]], dims)
+            yield points[nodes[firm]], places[firm]
 
 
 def _well_tied(nodes, a, b, dims):
-    """Nodes that keep at least `dims` distances to one another."""
+    """Nodes with at least `dims` distances to one another."""
     while True:
         inside = np.isin(a, nodes) & np.isin(b, nodes)
         count = np.bincount(np.concatenate([a[inside], b[inside]]), minlength=nodes.max() + 1)
-        kept = nodes[count[nodes] >= dims]
-        if len(kept) == len(nodes) or not len(kept):
-            return kept
-        nodes = kept
+        remaining = nodes[count[nodes] >= dims]
+        # Removing a node may weaken its neighbours, so repeat.
+        if len(remaining) == len(nodes) or not len(remaining):
+            return remaining
+        nodes = remaining
 
 
 def _solved(a, b, length, n, dims, rng):
-    """Places (n, dims) that keep the distances, or None."""
+    """Places (n, dims) that fit the distances, or None."""
     graph = coo_array((length, (a, b)), shape=(n, n)).tocsr()
     ways = shortest_path(graph, directed=False)
     if not np.isfinite(ways).all():
         return None
     middle = np.eye(n) - 1 / n
+    # Double centring turns squared distances into scalar products; their eigenvectors are the
+    # places.
     values, vectors = np.linalg.eigh(-0.5 * middle @ ways**2 @ middle)
     start = vectors[:, -dims:] * np.sqrt(np.maximum(values[-dims:], 0.0))
     for trial in range(TRIES):
@@ -70,6 +81,7 @@ def _solved(a, b, length, n, dims, rng):
         xyz = _adjusted(start + shake * rng.normal(size=start.shape), a, b, length)
         xyz = _unfolded(xyz, a, b, length)
         off = np.abs(np.linalg.norm(xyz[a] - xyz[b], axis=1) - length)
+        # 80 % of the distances must fit: blunders may remain.
         keep = np.sort(off / length)[min(len(off) - 1, int(0.8 * len(off)))]
         if keep < MISFIT:
             return xyz if _rigid(xyz, a, b) else None
@@ -77,7 +89,7 @@ def _solved(a, b, length, n, dims, rng):
 
 
 def _unfolded(xyz, a, b, length):
-    """Places after those that stand on the wrong side were put where their neighbours want them."""
+    """Move points on the wrong side to the position that fits their neighbours."""
     for _ in range(UNFOLDING):
         off = np.abs(np.linalg.norm(xyz[a] - xyz[b], axis=1) - length) / length
         worst = np.array([np.median(off[(a == i) | (b == i)]) for i in range(len(xyz))])
@@ -87,6 +99,7 @@ def _unfolded(xyz, a, b, length):
         near = np.concatenate([b[a == node], a[b == node]])
         away = np.concatenate([length[a == node], length[b == node]])
         middle = xyz[near].mean(axis=0)
+        # Differences of the circle equations are linear in the position.
         rows = 2 * (xyz[near] - middle)
         right = np.sum((xyz[near] - middle) ** 2, axis=1) - away**2
         moved = xyz.copy()
@@ -111,7 +124,7 @@ def _rows(xyz, a, b):
 
 
 def _adjusted(xyz, a, b, length):
-    """Places after damped Gauss-Newton steps, weights falling off beyond the median misfit."""
+    """Places after damped Gauss-Newton steps with Cauchy weights beyond the median misfit."""
     damping = 1e-3
     for _ in range(STEPS):
         jac, s = _rows(xyz, a, b)
@@ -136,18 +149,20 @@ def _adjusted(xyz, a, b, length):
 
 
 def _rigid(xyz, a, b):
+    """Whether the distances determine the shape of the network."""
     n, dims = xyz.shape
     singular = np.linalg.svd(_rows(xyz, a, b)[0], compute_uv=False)
-    needed = n * dims - dims * (dims + 1) // 2
-    return len(singular) >= needed and singular[needed - 1] > LOOSE * singular[0]
+    # All coordinates except the rigid motions, dims (dims + 1) / 2.
+    rank = n * dims - dims * (dims + 1) // 2
+    return len(singular) >= rank and singular[rank - 1] > LOOSE * singular[0]
 
 
 def _firm(xyz, a, b, dims):
-    """(n,) True for points that cannot be folded over the line or plane of their neighbours."""
+    """Mask (n,) of points that cannot be reflected at the line or plane of their neighbours."""
     n = len(xyz)
     firm = np.ones(n, dtype=bool)
     if n <= dims + 1:
-        return firm  # folding a triangle or a tetrahedron only mirrors it
+        return firm  # reflecting a triangle or a tetrahedron only mirrors it
     for node in range(n):
         near = np.concatenate([b[a == node], a[b == node]])
         spread = np.linalg.svd(xyz[near] - xyz[near].mean(axis=0), compute_uv=False)

@@ -1,4 +1,4 @@
-"""Local frames of photos that nothing known reaches, and how they join what is known."""
+"""Local frames of photos that no known position reaches, and their connection."""
 
 from dataclasses import replace
 from itertools import combinations
@@ -15,106 +15,136 @@ from tankcal.survey.start.pieces import BAD_JOINT, Motion, joint
 
 
 def join_local_frames(clues, piece, places, least):
-    """The Piece with local frames of what is left, and sentences about those that do not join.
+    """Add local frames of the remaining photos to a Piece.
 
-    places  (photos, 3) projection centres that were given, nan where none was
+    Parameters
+    ----------
+    clues : Clues
+    piece : Piece
+    places : ndarray, shape (photos, 3)
+        Given projection centres; nan: unknown.
+    least : int
+        Known points required in a photo.
+
+    Returns
+    -------
+    piece : Piece
+    reasons : list of str
+        Sentences about frames that do not join.
     """
-    given = piece
+    original = piece
     if not np.isfinite(piece.xyz_m[:, 0]).any() or not np.isfinite(piece.xyz_m[:, 2]).any():
         piece = grow_piece(clues, piece, least, free=not piece.oriented.any())
     tried, loose, reasons = piece.oriented.copy(), [], []
     while not tried.all():
-        own, why = blind_piece(clues.sights, ~tried, clues.points, clues.rng, clues.trial)
-        if own is None:
+        local, why = blind_piece(clues.sights, ~tried, clues.points, clues.rng, clues.trial)
+        if local is None:
             reasons.append(why)
             break
-        piece, loose = _attached(clues, piece, [*loose, own], least)
-        tried |= own.oriented | piece.oriented
+        piece, loose = _attached(clues, piece, [*loose, local], least)
+        tried |= local.oriented | piece.oriented
     if loose and not (piece.oriented.any() or (piece.known & ~_held(clues.survey)).any()):
-        own = max(loose, key=lambda one: one.oriented.sum())
-        motion = align_piece(clues.survey, own, piece.xyz_m, places)
-        piece = grow_piece(clues, piece.filled_from(own.moved(motion)), least)
-        piece, loose = _attached(clues, piece, [one for one in loose if one is not own], least)
-    reasons += [_apart(clues.survey, own, piece) for own in loose]
-    piece = _to_scale(clues, piece, given, places)
+        local = max(loose, key=lambda frame: frame.oriented.sum())
+        # Without a place in common, align the largest frame to single known coordinates.
+        motion = align_piece(clues.survey, local, piece.xyz_m, places)
+        piece = grow_piece(clues, piece.filled_from(local.moved(motion)), least)
+        piece, loose = _attached(
+            clues, piece, [frame for frame in loose if frame is not local], least
+        )
+    reasons += [_apart(clues.survey, local, piece) for local in loose]
+    piece = _scaled_about_photo(clues, piece, original, places)
     return grow_piece(clues, piece, least, free=not np.isfinite(piece.xyz_m[:, 0]).any()), reasons
 
 
 def _attached(clues, piece, loose, least):
-    """The Piece with all loose ones that share enough with it or one another, and the others."""
-    loose = [_stretched(clues, one) for one in loose]
+    """Join all frames that share enough with the Piece or with each other; return it and the
+    others."""
+    loose = [_stretched(clues, frame) for frame in loose]
     while True:
-        for own in loose:
-            joined = _joined(clues, own, piece)
+        for local in loose:
+            joined = _joined(clues, local, piece)
             if joined is not None:
                 piece = grow_piece(clues, joined, least)
-                loose = [one for one in loose if one is not own]
+                loose = [frame for frame in loose if frame is not local]
                 break
         else:
             pairs = ((a, b, _joined(clues, a, b)) for a, b in combinations(loose, 2))
-            first, second, joined = next((one for one in pairs if one[2]), (None,) * 3)
+            first, second, joined = next((frame for frame in pairs if frame[2]), (None,) * 3)
             if joined is None:
                 return piece, loose
             joined = grow_by_photos(clues.sights, joined, clues.rng, least=least)
-            rest = [one for one in loose if one is not first and one is not second]
+            rest = [frame for frame in loose if frame is not first and frame is not second]
             loose = [*rest, _stretched(clues, joined)]
 
 
-def _joined(clues, own, onto):
-    """The Piece `onto` with what another one adds, or None when too little is common."""
-    motion = joint(own, onto, clues.rng)
-    if motion is None or motion.misfit_m > BAD_JOINT * max(own.extent * motion.scale, 1e-9):
+def _joined(clues, local, onto):
+    """The Piece `onto` extended by another one, or None if too little is common."""
+    motion = joint(local, onto, clues.rng)
+    if motion is None or motion.misfit_m > BAD_JOINT * max(local.extent * motion.scale, 1e-9):
         return None
-    return onto.filled_from(own.moved(motion))
+    return onto.filled_from(local.moved(motion))
 
 
-def _to_scale(clues, piece, given, places):
-    """The Piece stretched about the only photo that was given whole, to what else is known.
+def _scaled_about_photo(clues, piece, original, places):
+    """Scale a Piece about its only completely given photo.
 
-    given   Piece of what was known at first         places  see `join_local_frames`
+    Relative orientation alone sets the base to 1. Single coordinates of other photos and of points
+    determine the scale.
 
-    Single coordinates of other photos and of points say how large it is: by relative orientation
-    alone its base has the length one.
+    Parameters
+    ----------
+    clues : Clues
+    piece : Piece
+    given : Piece
+        Positions known at the start.
+    places : ndarray, shape (photos, 3)
+        See `join_local_frames`.
     """
-    one, plan = given.oriented, clues.plan
+    is_given, plan = original.oriented, clues.plan
     taped = piece.known[plan.start] & piece.known[plan.end] & ~plan.flat
-    if one.sum() != 1 or given.known.any() or taped.any() or piece.oriented.sum() < 2:
+    if is_given.sum() != 1 or original.known.any() or taped.any() or piece.oriented.sum() < 2:
         return piece
     bare = replace(
         piece,
         xyz_m=np.full_like(piece.xyz_m, np.nan),
         by_photos=np.ones_like(piece.by_photos),
     )
-    bare, hinge = add_points(clues.sights, bare), given.place_m[one][0]
-    told = np.vstack([given.xyz_m, np.where(np.isfinite(given.place_m), given.place_m, places)])
-    away, wanted = np.vstack([bare.xyz_m, bare.place_m]) - hinge, told - hinge
-    both = np.isfinite(away) & np.isfinite(wanted)
-    square = float(np.sum(away[both] ** 2))
-    scale = float(np.sum(away[both] * wanted[both])) / square if square > 0 else 0.0
+    bare, hinge = add_points(clues.sights, bare), original.place_m[is_given][0]
+    targets = np.vstack(
+        [original.xyz_m, np.where(np.isfinite(original.place_m), original.place_m, places)]
+    )
+    away, target_offsets = np.vstack([bare.xyz_m, bare.place_m]) - hinge, targets - hinge
+    common = np.isfinite(away) & np.isfinite(target_offsets)
+    square = float(np.sum(away[common] ** 2))
+    # Least squares scale of the offsets from the given photo.
+    scale = float(np.sum(away[common] * target_offsets[common])) / square if square > 0 else 0.0
     if not scale > 0:
         return piece
-    return given.filled_from(bare.moved(Motion(np.eye(3), hinge * (1 - scale), scale, 0.0)))
+    return original.filled_from(bare.moved(Motion(np.eye(3), hinge * (1 - scale), scale, 0.0)))
 
 
 def _held(survey):
+    """Mask (points,) of points with certain coordinates."""
     return np.isfinite(certain_places(survey).piece.xyz_m).any(axis=1)
 
 
 def _stretched(clues, piece):
-    """The Piece with the scale that distances give it."""
+    """The Piece scaled by measured distances."""
     plan, known = clues.plan, piece.known
     use = known[plan.start] & known[plan.end] & ~plan.flat
     computed = np.linalg.norm(piece.xyz_m[plan.end[use]] - piece.xyz_m[plan.start[use]], axis=1)
     good = computed > 0
     if not good.any():
         return piece
+    # The median ratio is robust against blunders.
     scale = float(np.median(plan.length[use][good] / computed[good]))
     return replace(piece, xyz_m=scale * piece.xyz_m, place_m=scale * piece.place_m)
 
 
-def _apart(survey, own, piece):
-    names = [survey.photos.names[i] for i in np.flatnonzero(own.oriented & ~piece.oriented)]
-    common, some = int((own.known & piece.known).sum()), ", ".join(names[:10])
+def _apart(survey, local, piece):
+    """Sentence about photos of a frame that does not join."""
+    names = [survey.photos.names[i] for i in np.flatnonzero(local.oriented & ~piece.oriented)]
+    common, some = int((local.known & piece.known).sum()), ", ".join(names[:10])
     if common > 3:
         why = message(
             "shared_do_not_fit",

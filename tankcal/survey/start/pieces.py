@@ -1,26 +1,32 @@
-"""Pieces of a survey, with points and photos known in one frame, and how two of them are joined.
+"""Pieces of a survey, each with points and photos in one frame, and their connection.
 
     X_onto = scale R X + shift
 
-Three points, or one photo and a further place, fix it; many triples are tried and the one wins that
-most places agree with. Source: Umeyama 1991 (similarity of point sets); Fischler & Bolles 1981.
+Three points, or one photo and a further place, determine the transformation. Many triples are
+tried; the transformation with which most places agree is used. Source: Umeyama 1991 (similarity of
+point sets); Fischler & Bolles 1981.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-TRIPLES = 200
-BAD_JOINT = 0.05  # misfit of a joint, as a share of the extent, beyond which it is none
+TRIPLES = 200  # samples of three common places
+BAD_JOINT = 0.05  # relative misfit above which a joint is rejected
 FLAT = 0.02  # height over length below which three places lie on a line
 
 
 @dataclass(frozen=True)
 class Piece:
-    """What is known in one frame; nan where nothing is.
+    """Known positions in one frame; nan: unknown.
 
-    xyz_m      (points, 3)           by_photos  (points,) True: photos may improve it
-    place_m    (photos, 3)           rotation   (photos, 3, 3)
+    Attributes
+    ----------
+    xyz_m : ndarray, shape (points, 3)
+    by_photos : ndarray of bool, shape (points,)
+        True: photos may improve the point.
+    place_m : ndarray, shape (photos, 3)
+    rotation : ndarray, shape (photos, 3, 3)
     """
 
     xyz_m: np.ndarray
@@ -30,22 +36,22 @@ class Piece:
 
     @property
     def known(self):
-        """(points,) True where all three coordinates are known."""
+        """Mask (points,), True where all three coordinates are known."""
         return np.isfinite(self.xyz_m).all(axis=1)
 
     @property
     def oriented(self):
-        """(photos,) True where place and rotation are known."""
+        """Mask (photos,), True where position and rotation are known."""
         return np.isfinite(self.place_m).all(axis=1) & np.isfinite(self.rotation).all(axis=(1, 2))
 
     @property
     def extent(self):
-        """Diagonal of the box around all that is known, m."""
+        """Diagonal of the box around all known positions, m."""
         places = np.vstack([self.xyz_m[self.known], self.place_m[self.oriented]])
         return float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
 
     def moved(self, motion):
-        """The piece after a Motion."""
+        """Apply a Motion."""
         return replace(
             self,
             xyz_m=motion.of(self.xyz_m),
@@ -54,7 +60,7 @@ class Piece:
         )
 
     def filled_from(self, other):
-        """The piece, with what only the other one (in the same frame) knows."""
+        """Add positions known only in another Piece of the same frame."""
         photos = self.oriented
         return replace(
             self,
@@ -67,7 +73,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class Motion:
-    """X_onto = scale rotation X + shift_m; `misfit_m` is what most of the common places keep."""
+    """X_onto = scale rotation X + shift_m; `misfit_m` is met by most of the common places."""
 
     rotation: np.ndarray
     shift_m: np.ndarray
@@ -80,7 +86,7 @@ class Motion:
 
 
 def empty(points, photos):
-    """A Piece that knows nothing."""
+    """A Piece without known positions."""
     return Piece(
         np.full((points, 3), np.nan),
         np.ones(points, dtype=bool),
@@ -90,82 +96,112 @@ def empty(points, photos):
 
 
 def joint(piece, onto, rng):
-    """The Motion that brings a piece onto another by points and photos that both know, or None."""
+    """Estimate the Motion that brings a piece onto another, from common points and photos.
+
+    Parameters
+    ----------
+    piece, onto : Piece
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    Motion or None
+        None: too little is common.
+    """
     points, photos = piece.known & onto.known, piece.oriented & onto.oriented
     here = np.vstack([piece.xyz_m[points], piece.place_m[photos]])
     there = np.vstack([onto.xyz_m[points], onto.place_m[photos]])
-    motions = _by_triples(here, there, rng)
+    motions = _motions_of_triples(here, there, rng)
     turns = onto.rotation[photos].transpose(0, 2, 1) @ piece.rotation[photos]
+    # A common photo gives the rotation; scale and shift follow from the other places.
     motions += [_turned(turn, here, there, piece.place_m[photos][i], onto.place_m[photos][i])
                 for i, turn in enumerate(turns)]  # fmt: skip
-    motions = [one for one in motions if one is not None]
+    motions = [motion for motion in motions if motion is not None]
     if not motions:
         return None
-    best = min(motions, key=lambda one: one.misfit_m)
+    best = min(motions, key=lambda motion: motion.misfit_m)
     return _polished(best, here, there)
 
 
 def similarity(here, there, weight=None):
-    """Motion of places (n, 3), not in line, onto others by (weighted) least squares."""
+    """(Weighted) least squares similarity between two sets of places (n, 3), not on a line.
+
+    Parameters
+    ----------
+    here, there : ndarray, shape (n, 3)
+    weight : ndarray, shape (n,), optional
+
+    Returns
+    -------
+    Motion
+    """
     w = np.ones(len(here)) if weight is None else weight
     w = w / w.sum()
     a, b = w @ here, w @ there
     p, q = here - a, there - b
     u, singular, v = np.linalg.svd((q * w[:, None]).T @ p)
+    # The sign of the last singular direction excludes reflections (Umeyama 1991).
     side = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ v))])
     rotation = (u * side) @ v
     scale = float(singular @ side / np.sum(w[:, None] * p * p))
-    return _judged(rotation, b - scale * rotation @ a, scale, here, there)
+    return _motion_with_misfit(rotation, b - scale * rotation @ a, scale, here, there)
 
 
-def _judged(rotation, shift, scale, here, there):
+def _motion_with_misfit(rotation, shift, scale, here, there):
+    """The Motion with its misfit: the distance met by just over half of the places."""
     off = np.linalg.norm(scale * here @ rotation.T + shift - there, axis=1)
     place = min(len(off) - 1, len(off) // 2 + 1)
     return Motion(rotation, shift, scale, float(np.partition(off, place)[place]))
 
 
-def _by_triples(here, there, rng):
-    """Motions by triples of common places."""
+def _motions_of_triples(here, there, rng):
+    """Motions from triples of common places."""
     n = len(here)
     if n < 3:
         return []
     triples = rng.integers(0, n, (TRIPLES, 3)) if n > 5 else np.array(
         [(i, j, k) for i in range(n) for j in range(i + 1, n) for k in range(j + 1, n)]
     )  # fmt: skip
-    found = []
+    motions = []
     for triple in triples:
         sides = here[triple[1:]] - here[triple[0]]
         extent = max(np.sum(sides**2, axis=1).max(), np.sum((sides[1] - sides[0]) ** 2))
+        # A triple on a line leaves the rotation about it undetermined.
         if np.linalg.norm(np.cross(*sides)) > FLAT * extent:
             motion = similarity(here[triple], there[triple])
-            found.append(_judged(motion.rotation, motion.shift_m, motion.scale, here, there))
-    return found
+            motions.append(
+                _motion_with_misfit(motion.rotation, motion.shift_m, motion.scale, here, there)
+            )
+    return motions
 
 
 def _turned(turn, here, there, centre, onto):
-    """The Motion with a known rotation that brings one place onto another; scale from the rest."""
+    """The Motion with a known rotation that maps one place onto another; other places give the
+    scale."""
     before = np.linalg.norm(here - centre, axis=1)
     after = np.linalg.norm(there - onto, axis=1)
+    # Places at the centre give no ratio of distances.
     apart = before > 1e-6 * max(before.max(initial=0.0), 1e-30)
     scale = float(np.median(after[apart] / before[apart])) if apart.any() else 1.0
     if not scale > 0:
         return None
-    return _judged(turn, onto - scale * turn @ centre, scale, here, there)
+    return _motion_with_misfit(turn, onto - scale * turn @ centre, scale, here, there)
 
 
 def _polished(motion, here, there):
-    """The Motion by all places, weights falling off beyond its misfit."""
+    """Refit a Motion to all places with Cauchy weights beyond its misfit."""
     if len(here) < 3:
         return motion
     for _ in range(5):
         off = np.linalg.norm(motion.of(here) - there, axis=1)
+        # Cauchy weights: places beyond the misfit lose influence.
         weight = 1 / (1 + (off / max(2 * motion.misfit_m, 1e-12)) ** 2)
         spread = np.linalg.svd((here - np.average(here, axis=0, weights=weight))
                                * np.sqrt(weight)[:, None], compute_uv=False)  # fmt: skip
         if spread[1] < FLAT * spread[0]:
             return motion
-        found = similarity(here, there, weight)
-        if not found.misfit_m < motion.misfit_m * (1 - 1e-6):
+        refined = similarity(here, there, weight)
+        if not refined.misfit_m < motion.misfit_m * (1 - 1e-6):
             break
-        motion = found
+        motion = refined
     return motion

@@ -1,7 +1,7 @@
-"""What a survey says about positions in plan: directions by circle, horizontal lengths, slopes.
+"""Observations in plan: directions by circle, horizontal lengths, slopes.
 
-Azimuths become a circle whose zero is north; horizontal angles that share sights at a station
-become one circle with the first sight as its zero.
+Azimuths form a circle whose zero is north. Horizontal angles with common sights at a station form
+one circle with the first sight as its zero.
 """
 
 from dataclasses import dataclass
@@ -16,20 +16,31 @@ from tankcal.survey.observations import (
     VerticalAngles,
 )
 
-STEEP = 0.2  # horizontal length over slope distance below which heights reduce it badly
+STEEP = 0.2  # horizontal over slope distance below which heights reduce it poorly
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Sights in plan, all arrays of points' numbers and SI values.
+    """Observations in plan, as arrays of point numbers and SI values.
 
-    station, target, circle, reading  (n,) directions
-    north        (circles,) True where the zero of the circle is known to be north
-    at           (circles,) station of each circle
-    start, end, length, flat, rise    (d,) distances, freed of scale and offset; flat: horizontal
-    low, high, slope                  (v,) vertical angles above the horizon, rad
-    lift         (v,) height of instrument minus that of target      bend  (v,) per m
-    points       number of points of the survey
+    Attributes
+    ----------
+    station, target, circle, reading : ndarray, shape (n,)
+        Directions.
+    north : ndarray of bool, shape (circles,)
+        True where the zero of the circle is north.
+    at : ndarray of int, shape (circles,)
+        Station of each circle.
+    start, end, length, flat, rise : ndarray, shape (d,)
+        Distances, corrected for scale and offset; flat: horizontal.
+    low, high, slope : ndarray, shape (v,)
+        Vertical angles above the horizon, rad.
+    lift : ndarray, shape (v,)
+        Height of instrument minus height of target, m.
+    bend : ndarray, shape (v,)
+        Curvature less refraction, 1/m.
+    points : int
+        Number of points of the survey.
     """
 
     station: np.ndarray
@@ -51,14 +62,14 @@ class Plan:
     points: int
 
     def pairs(self, start, end):
-        """One number for each unordered pair of points (n,)."""
+        """Number (n,) of each unordered pair of points."""
         return np.minimum(start, end) * self.points + np.maximum(start, end)
 
     def lengths(self, z_m, heights_first=False):
-        """Pairs (k,), sorted, and the horizontal length of each, where it can be known.
+        """Sorted pairs (k,) and the horizontal length of each, where it can be determined.
 
-        A slope distance is reduced by the vertical angle of the same line, else by heights; the
-        other way round with `heights_first`, for heights are controlled and an angle is not.
+        A slope distance is reduced by the vertical angle of its line, else by heights.
+        `heights_first` reverses this order, as heights are controlled and a single angle is not.
         """
         pair = self.pairs(self.start, self.end)
         slopes = medians(self.pairs(self.low, self.high), np.abs(self.slope))
@@ -66,24 +77,26 @@ class Plan:
         by_angle = self.length * np.cos(look_up(*slopes, pair))
         drop = z_m[self.end] - z_m[self.start] - self.rise
         square = self.length**2 - drop**2
+        # Pythagoras loses accuracy on steep lines, where the horizontal part is small.
         by_height = np.sqrt(np.where(square > (STEEP * self.length) ** 2, square, np.nan))
         if heights_first:
             by_angle, by_height = by_height, by_angle
-        found = np.where(self.flat, flat, np.where(np.isfinite(by_angle), by_angle, by_height))
-        good = np.isfinite(found)
-        return medians(pair[good], found[good])
+        reduced = np.where(self.flat, flat, np.where(np.isfinite(by_angle), by_angle, by_height))
+        good = np.isfinite(reduced)
+        return medians(pair[good], reduced[good])
 
 
 def medians(groups, values):
-    """Groups (k,), sorted, and the median of the values (n,) of each."""
+    """Sorted groups (k,), and the median of the values (n,) of each."""
+    # Sorted by group, then by value: the median is in the middle of each group.
     order = np.lexsort([values, groups])
     groups, values = groups[order], values[order]
-    found, first, count = np.unique(groups, return_index=True, return_counts=True)
-    return found, 0.5 * (values[first + (count - 1) // 2] + values[first + count // 2])
+    distinct, first, count = np.unique(groups, return_index=True, return_counts=True)
+    return distinct, 0.5 * (values[first + (count - 1) // 2] + values[first + count // 2])
 
 
 def look_up(groups, values, wanted):
-    """Values (n,) of wanted groups (n,), nan where a group has none."""
+    """Values (n,) of the wanted groups (n,), nan for absent groups."""
     if not len(groups):
         return np.full(len(wanted), np.nan)
     place = np.minimum(np.searchsorted(groups, wanted), len(groups) - 1)
@@ -91,24 +104,25 @@ def look_up(groups, values, wanted):
 
 
 def plan_of(survey):
-    """The Plan of a Survey, observations that are set aside left out."""
-    groups = [_used(one) for one in survey.observations]
+    """The Plan of a survey, without rejected observations."""
+    groups = [_used(item) for item in survey.observations]
     circles = _Circles(len(survey.sets))
-    for one in groups:
-        if isinstance(one, Directions):
-            circles.add(one.start, one.end, one.set, one.value)
-        elif isinstance(one, Azimuths):
-            circles.add_azimuths(one)
-        elif isinstance(one, HorizontalAngles):
-            circles.add_angles(one)
+    for item in groups:
+        if isinstance(item, Directions):
+            circles.add(item.start, item.end, item.set, item.value)
+        elif isinstance(item, Azimuths):
+            circles.add_azimuths(item)
+        elif isinstance(item, HorizontalAngles):
+            circles.add_angles(item)
     points = len(survey.points)
     return Plan(
         *circles.rows(), *circles.zeros(), *_distances(survey, groups), *_slopes(groups), points
     )
 
 
-def _used(one):
-    return one if one.use is None else one.taken(one.use > 0)
+def _used(observations):
+    """Observations without rejected rows."""
+    return observations if observations.use is None else observations.taken(observations.use > 0)
 
 
 def _joined(parts, kinds):
@@ -125,31 +139,34 @@ def _distances(survey, groups):
     scale = np.array([tool.scale for tool in survey.instruments] + [0.0])
     offset = np.array([tool.offset_m for tool in survey.instruments] + [0.0])
     parts = []
-    for one in groups:
-        if isinstance(one, Distances):
-            length = (one.value - offset[one.instrument]) / (1 + scale[one.instrument])
-            flat = np.full(len(one), one.horizontal)
-            parts.append((one.start, one.end, length, flat, _rise(one)))
+    for item in groups:
+        if isinstance(item, Distances):
+            # Invert reading = (1 + scale) true + offset.
+            length = (item.value - offset[item.instrument]) / (1 + scale[item.instrument])
+            flat = np.full(len(item), item.horizontal)
+            parts.append((item.start, item.end, length, flat, _rise(item)))
     return _joined(parts, (int, int, float, bool, float))
 
 
 def _slopes(groups):
     """Low, high, slope, lift, bend of all vertical angles."""
     parts = []
-    for one in groups:
-        if isinstance(one, VerticalAngles):
-            slope = np.pi / 2 - one.value if one.zenith else one.value
-            bend = np.full(len(one), one.bend_per_m)
-            parts.append((one.start, one.end, slope, _rise(one), bend))
+    for item in groups:
+        if isinstance(item, VerticalAngles):
+            # Zenith angles become angles above the horizon.
+            slope = np.pi / 2 - item.value if item.zenith else item.value
+            bend = np.full(len(item), item.bend_per_m)
+            parts.append((item.start, item.end, slope, _rise(item), bend))
     return _joined(parts, (int, int, float, float, float))
 
 
-def _rise(one):
-    return np.zeros(len(one)) if one.rise_m is None else one.rise_m
+def _rise(sights):
+    """Instrument height minus target height (n,), m."""
+    return np.zeros(len(sights)) if sights.rise_m is None else sights.rise_m
 
 
 class _Circles:
-    """Directions by circle; those of direction sets come first, under their own numbers."""
+    """Directions by circle; direction sets come first, with their own numbers."""
 
     def __init__(self, sets):
         self.parts, self.north = [], [False] * sets
@@ -157,25 +174,30 @@ class _Circles:
     def add(self, station, target, circle, reading):
         self.parts.append((station, target, circle, reading))
 
-    def add_azimuths(self, one):
-        stations, circle = np.unique(one.start, return_inverse=True)
-        self.add(one.start, one.end, circle + len(self.north), one.value)
+    def add_azimuths(self, azimuths):
+        stations, circle = np.unique(azimuths.start, return_inverse=True)
+        self.add(azimuths.start, azimuths.end, circle + len(self.north), azimuths.value)
         self.north += [True] * len(stations)
 
-    def add_angles(self, one):
-        """Angles of a station that share sights, chained from the first sight."""
-        for station in np.unique(one.start):
-            mine = one.start == station
+    def add_angles(self, angles):
+        """Chain the angles of a station with common sights from the first sight."""
+        for station in np.unique(angles.start):
+            is_at_station = angles.start == station
             links = {}
-            for a, b, angle in zip(one.origin[mine], one.end[mine], one.value[mine], strict=True):
+            for a, b, angle in zip(
+                angles.origin[is_at_station],
+                angles.end[is_at_station],
+                angles.value[is_at_station],
+                strict=True,
+            ):
                 links.setdefault(int(a), []).append((int(b), angle))
                 links.setdefault(int(b), []).append((int(a), -angle))
-            seen = set()
+            chained = set()
             for first in links:
-                if first in seen:
+                if first in chained:
                     continue
                 chain = _chained(first, links)
-                seen |= set(chain)
+                chained |= set(chain)
                 rows = np.array(list(chain)), np.array(list(chain.values()))
                 count = len(chain)
                 number = np.full(count, len(self.north))
@@ -193,12 +215,13 @@ class _Circles:
 
 
 def _chained(first, links):
-    """Readings {target: rad} from angles between targets, with the first target at zero."""
-    found, queue = {first: 0.0}, [first]
+    """Readings {target: rad} from angles between targets, the first target at zero."""
+    readings, queue = {first: 0.0}, [first]
+    # Breadth-first: each reading is the sum of as few angles as possible.
     while queue:
         here = queue.pop(0)
-        for there, angle in links[here]:
-            if there not in found:
-                found[there] = found[here] + angle
-                queue.append(there)
-    return found
+        for target, angle in links[here]:
+            if target not in readings:
+                readings[target] = readings[here] + angle
+                queue.append(target)
+    return readings

@@ -1,8 +1,8 @@
-"""Local frames in plan: what hangs together without known points, and how it joins what is known.
+"""Local frames in plan without known points, and their connection to known positions.
 
-A traverse between two known points has no known direction, a network without control no known
-point at all: it starts with a station at the origin and its first direction towards +y, grows, and
-is then turned and shifted (and stretched, if nothing in it was measured in metres) onto the rest.
+A traverse between two known points has no known direction; a network without control has no known
+point. Each starts with a station at the origin and its first direction towards +y and grows. It is
+then rotated and shifted onto the known positions, and scaled if it contains no measured length.
 """
 
 from dataclasses import dataclass, replace
@@ -14,13 +14,14 @@ from tankcal.survey.start.lateration import lay_out_networks
 from tankcal.survey.start.plan import look_up
 from tankcal.survey.start.polar import grow_in_plan, orient_circles
 
-MISFIT = 0.05  # of a joint, as a share of the distance between its points
-PAIRS = 60  # pairs of common points that are tried
+MISFIT = 0.05  # relative misfit of a joint over the distance of its points
+PAIRS = 60  # pairs of common points tried
 
 
 @dataclass(frozen=True)
 class Local:
-    """A local frame: xy_m (points, 2); whether it has metres, north; whether it may be mirrored."""
+    """A local frame: xy_m (points, 2); whether it has a scale, a north direction, and may be
+    mirrored."""
 
     xy_m: np.ndarray
     scaled: bool
@@ -29,19 +30,31 @@ class Local:
 
     @property
     def known(self):
-        """(points,) True where the place is known."""
+        """Mask (points,), True where the position is known."""
         return np.isfinite(self.xy_m[:, 0])
 
 
 def find_plan_positions(plan, xy_m, z_m, rng):
-    """Positions (points, 2) in plan, and the Locals that could not be joined to them.
+    """Compute positions in plan, and the local frames that could not be joined to them.
 
-    xy_m  (points, 2) nan where not known; without any known point the largest Local is the frame
-    z_m   (points,) nan where not known
+    Parameters
+    ----------
+    plan : Plan
+    xy_m : ndarray, shape (points, 2)
+        nan: unknown; without a known point the largest local frame is used.
+    z_m : ndarray, shape (points,)
+        nan: unknown.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    xy_m : ndarray, shape (points, 2)
+    locals : list of Local
     """
     main = Local(xy_m, True, True)
     while True:
         if main.known.any():
+            # Lengths would contradict a frame with an arbitrary scale.
             plain = plan if main.scaled else _without_lengths(plan)
             main = replace(main, xy_m=grow_in_plan(plain, main.xy_m, z_m, main.north))
         pieces = _locals(plan, main, z_m, rng)
@@ -50,18 +63,19 @@ def find_plan_positions(plan, xy_m, z_m, rng):
             main = pieces.pop()
             main = replace(main, mirrored=False)
             continue
-        left, before = [], main.known.sum()
+        unjoined, before = [], main.known.sum()
         for piece in _merged(pieces):
             joined = _joined(piece, main)
             if joined is None:
-                left.append(piece)
+                unjoined.append(piece)
             else:
                 main = joined
         if main.known.sum() == before:
-            return main.xy_m, left
+            return main.xy_m, unjoined
 
 
 def _without_lengths(plan):
+    """The Plan without distances."""
     none = slice(0, 0)
     return replace(
         plan, start=plan.start[none], end=plan.end[none], length=plan.length[none],
@@ -70,30 +84,32 @@ def _without_lengths(plan):
 
 
 def _locals(plan, main, z_m, rng):
-    """Locals of what the main frame does not know."""
+    """Local frames of points unknown in the main frame."""
     lengths = plan.lengths(z_m)
     zeros = orient_circles(plan, main.xy_m, main.north)
     waiting = np.isnan(zeros) | ~main.known[np.maximum(plan.at, 0)]
-    taken, found = np.zeros(len(plan.north), dtype=bool), []
+    is_used, frames = np.zeros(len(plan.north), dtype=bool), []
     for circle, first, second, base in _seeds(plan, lengths, waiting & (plan.at >= 0)):
-        if taken[circle]:
+        if is_used[circle]:
             continue
         local = _grown(plan, z_m, plan.at[circle], second, base)
-        turned = np.isfinite(orient_circles(plan, local.xy_m, False)) & local.known[plan.at]
-        taken |= turned
-        if local.known.sum() > 2 or not found:
-            found.append(local)
+        is_oriented = np.isfinite(orient_circles(plan, local.xy_m, False)) & local.known[plan.at]
+        is_used |= is_oriented
+        # A frame of two points adds nothing to others.
+        if local.known.sum() > 2 or not frames:
+            frames.append(local)
         del first
-    return found + _by_lengths(plan, main, lengths, rng)
+    return frames + _frames_of_distances(plan, main, lengths, rng)
 
 
 def _seeds(plan, lengths, waiting):
-    """Circle, station, target and length (nan: none) to start from, those with most lengths first.
+    """Yield circle, station, target and length (nan: none) of starts, most lengths first.
 
-    Without a length the target must look back.
+    Without a length, the target must observe the station.
     """
     length = look_up(*lengths, plan.pairs(plan.station, plan.target))
     sights = set(zip(plan.station.tolist(), plan.target.tolist(), strict=True))
+    # The small constant prefers circles with more directions among equal numbers of lengths.
     taped = np.bincount(plan.circle, weights=np.isfinite(length) + 1e-3, minlength=len(plan.north))
     for circle in np.argsort(-taped, kind="stable"):
         if not waiting[circle]:
@@ -110,7 +126,7 @@ def _seeds(plan, lengths, waiting):
 
 
 def _grown(plan, z_m, first, second, base):
-    """The Local that grows from two points, one at the origin, the other towards +y."""
+    """Grow a Local from two points, one at the origin, the other towards +y."""
     xy = np.full((plan.points, 2), np.nan)
     xy[first], xy[second] = 0.0, (0.0, 1.0 if np.isnan(base) else base)
     if np.isnan(base):
@@ -120,13 +136,14 @@ def _grown(plan, z_m, first, second, base):
         ratio = length / np.linalg.norm(xy[low] - xy[high], axis=1)
         if not np.isfinite(ratio).any():
             return _north_up(plan, Local(xy, False, False))
+        # Measured lengths give the scale afterwards; the median is robust.
         xy = xy * np.nanmedian(ratio)
     xy = grow_in_plan(plan, xy, z_m, north=False)
     return _north_up(plan, Local(xy, True, False))
 
 
 def _north_up(plan, local):
-    """The Local turned so that its azimuths count from +y, if there are any."""
+    """Rotate a Local so that its azimuths count from +y, if it has azimuths."""
     zeros = orient_circles(plan, local.xy_m, False)[plan.north]
     zeros = zeros[np.isfinite(zeros)]
     if not len(zeros):
@@ -141,8 +158,8 @@ def _turning(angle):
     return np.array([[c, s], [-s, c]])
 
 
-def _by_lengths(plan, main, lengths, rng):
-    """Locals of points that are tied by distances; those to known points included."""
+def _frames_of_distances(plan, main, lengths, rng):
+    """Local frames of points connected by distances, including distances to known points."""
     low, high = np.divmod(lengths[0], plan.points)
     open_ended = ~(main.known[low] & main.known[high])
     if not open_ended.any() or np.isin(low, plan.station).any():
@@ -154,42 +171,45 @@ def _by_lengths(plan, main, lengths, rng):
     start = np.concatenate([low[open_ended], sides[:, 0]])
     end = np.concatenate([high[open_ended], sides[:, 1]])
     length = np.concatenate([lengths[1][open_ended], between])
-    found = []
+    frames = []
     for points, places in lay_out_networks(start, end, length, 2, rng):
         xy = np.full((plan.points, 2), np.nan)
         xy[points] = places
-        found.append(Local(xy, True, False, mirrored=True))
-    return found
+        frames.append(Local(xy, True, False, mirrored=True))
+    return frames
 
 
 def _size(piece):
+    """Sort key: scaled frames first, then by number of points."""
     return piece.scaled, piece.known.sum()
 
 
 def _merged(pieces):
-    """Locals, joined with one another where they can be, the largest first."""
+    """Local frames joined with each other where possible, the largest first."""
     pieces = sorted(pieces, key=_size, reverse=True)
-    done = []
+    merged = []
     while pieces:
         main, rest = pieces[0], pieces[1:]
         grown = True
         while grown:
-            grown, left = False, []
+            grown, unjoined = False, []
             for piece in rest:
                 joined = None if main.mirrored else _joined(piece, main)
                 main, grown = (main, grown) if joined is None else (joined, True)
-                left += [piece] if joined is None else []
-            rest = left
-        done.append(main)
+                unjoined += [piece] if joined is None else []
+            rest = unjoined
+        merged.append(main)
         pieces = rest
-    return done
+    return merged
 
 
 def _joined(piece, onto):
-    """The Local `onto` with what a piece adds, or None when too little is common."""
+    """The Local `onto` extended by another one, or None if too little is common."""
     stiff = piece.scaled and onto.scaled
     common = np.flatnonzero(piece.known & onto.known)
     north = piece.north and onto.north
+    # Common points needed: one fixes the shift, a second the rotation or scale, a third the
+    # handedness.
     enough = 1 if north and stiff else 3 if piece.mirrored else 2
     if len(common) < enough:
         return None
@@ -197,10 +217,10 @@ def _joined(piece, onto):
     for mirror in (1.0, -1.0) if piece.mirrored else (1.0,):
         xy = piece.xy_m * [mirror, 1.0]
         for a, turn, scale in _motions(xy[common], onto.xy_m[common], stiff, north):
-            found = scale * (xy - xy[common[a]]) @ turn.T + onto.xy_m[common[a]]
-            misfit = np.abs(found[common] - onto.xy_m[common]).sum()
+            candidate = scale * (xy - xy[common[a]]) @ turn.T + onto.xy_m[common[a]]
+            misfit = np.abs(candidate[common] - onto.xy_m[common]).sum()
             if misfit < best:
-                best, moved = misfit, found
+                best, moved = misfit, candidate
     size = np.linalg.norm(np.ptp(onto.xy_m[common], axis=0))
     if moved is None or (len(common) > 1 and best > 2 * MISFIT * size * len(common)):
         return None
@@ -212,7 +232,7 @@ def _joined(piece, onto):
 
 
 def _motions(here, there, stiff, north):
-    """Place, turn (2, 2) and scale of motions by single places, or by pairs."""
+    """Yield point, rotation (2, 2) and scale of motions from single points, or from pairs."""
     if north and stiff:
         yield from ((a, np.eye(2), 1.0) for a in range(len(here)))
         return

@@ -1,8 +1,8 @@
-"""How positions in plan grow from known ones: polar, intersection, arcs, free stationing, traverse.
+"""Growth of positions in plan: polar points, intersections, arcs, free stations, traverses.
 
-A point is where two lines, a line and an arc, or two arcs from known points meet; of all such
-places the one with the smallest sum of misfits to everything that is known of the point wins. A
-point that could as well stand elsewhere waits. What is controlled comes before what is not.
+A point lies where two lines, a line and an arc, or two arcs from known points intersect. The
+intersection with the smallest sum of misfits to all observations of the point is used. A point with
+two equivalent positions waits. Controlled points come before uncontrolled ones.
 """
 
 from itertools import combinations
@@ -11,38 +11,59 @@ import numpy as np
 
 from tankcal.survey.start.plan import look_up
 
-MOST = 8  # sights of a point or station that are combined; all of them judge
-IMPROVING = 4  # rounds in which all positions are found again
-STILL_M = 1e-3  # movement of all positions below which they stay
-THIN = 0.02  # sine of the angle at which lines must meet at least
-APART = 0.02  # places of a point farther apart than this share of its sights are two
-RIVAL = 2.0  # a second place counts when its misfit is below this multiple of the best one's
-NOISE = 1e-3  # misfit that says nothing, as a share of the sights
+MOST = 8  # sights of a point that are combined; all sights are compared with the result
+IMPROVING = 4  # rounds in which all positions are recomputed
+STILL_M = 1e-3  # largest change of positions at convergence
+THIN = 0.02  # smallest sine of the angle between intersecting lines
+APART = 0.02  # relative distance above which two positions differ
+RIVAL = 2.0  # misfit ratio to the best position, below which another is equivalent
+NOISE = 1e-3  # relative misfit regarded as noise
 
 
 def grow_in_plan(plan, xy_m, z_m, north=True):
-    """Positions (points, 2) in plan with all that follow from the known ones.
+    """Extend positions in plan by all points that follow from known ones.
 
-    xy_m   (points, 2) nan where not known      z_m  (points,) nan where not known
-    north  whether the frame's +y is the zero of azimuths
+    Parameters
+    ----------
+    plan : Plan
+    xy_m : ndarray, shape (points, 2)
+        nan: unknown.
+    z_m : ndarray, shape (points,)
+        nan: unknown.
+    north : bool
+        Whether +y of the frame is the zero of azimuths.
+
+    Returns
+    -------
+    ndarray, shape (points, 2)
     """
     xy, lengths = xy_m.copy(), plan.lengths(z_m)
-    needed = 3
+    required = 3
     while True:
         waiting = np.isnan(xy[:, 0])
         zeros = orient_circles(plan, xy, north)
-        _place_points(plan, xy, zeros, lengths, needed, waiting, needed > 2)
-        _place_stations(plan, xy, lengths, needed, waiting & np.isnan(xy[:, 0]), needed > 2)
+        _place_points(plan, xy, zeros, lengths, required, waiting, required > 2)
+        _place_stations(plan, xy, lengths, required, waiting & np.isnan(xy[:, 0]), required > 2)
+        # Three sights control a position; two are accepted only when no controlled point is left.
         if np.isnan(xy[:, 0]).sum() < waiting.sum():
-            needed = 3
-        elif needed == 3:
-            needed = 2
+            required = 3
+        elif required == 3:
+            required = 2
         else:
             return xy
 
 
 def orient_circles(plan, xy_m, north=True):
-    """Azimuths (circles,) of the zeros: the one that most known targets agree with, or nan."""
+    """Azimuths (circles,) of the circle zeros with which most known targets agree, rad; nan:
+    unknown.
+
+    Parameters
+    ----------
+    plan : Plan
+    xy_m : ndarray, shape (points, 2)
+    north : bool
+        Whether +y of the frame is the zero of azimuths.
+    """
     d = xy_m[plan.target] - xy_m[plan.station]
     zero = np.arctan2(d[:, 0], d[:, 1]) - plan.reading
     zeros = np.full(len(plan.north), np.nan)
@@ -50,21 +71,35 @@ def orient_circles(plan, xy_m, north=True):
     good = good[np.argsort(plan.circle[good], kind="stable")]
     circles, first = np.unique(plan.circle[good], return_index=True)
     for circle, rows in zip(circles, np.split(good, first[1:])[: len(circles)], strict=True):
-        mine = zero[rows]
-        tried = mine[:: max(1, len(mine) // 50)]
-        off = np.abs(_wrapped(mine[None] - tried[:, None])).sum(axis=1)
+        zeros_of_circle = zero[rows]
+        tried = zeros_of_circle[:: max(1, len(zeros_of_circle) // 50)]
+        # The sum of absolute differences is a median: blunders are outvoted.
+        off = np.abs(_wrapped(zeros_of_circle[None] - tried[:, None])).sum(axis=1)
         zeros[circle] = _wrapped(tried[np.argmin(off)])
     return np.where(plan.north, 0.0, zeros) if north else zeros
 
 
 def _wrapped(angle):
+    """Angles reduced to -pi to pi."""
     return angle - 2 * np.pi * np.round(angle / (2 * np.pi))
 
 
 def improved_in_plan(plan, xy_m, z_m, held, north=True):
-    """Positions (points, 2) in plan, each found again from the others: blunders are outvoted.
+    """Recompute each position in plan from the others, so that blunders are outvoted.
 
-    held  (points,) True for positions that stay
+    Parameters
+    ----------
+    plan : Plan
+    xy_m : ndarray, shape (points, 2)
+    z_m : ndarray, shape (points,)
+    held : ndarray of bool, shape (points,)
+        Positions that stay.
+    north : bool
+        Whether +y of the frame is the zero of azimuths.
+
+    Returns
+    -------
+    ndarray, shape (points, 2)
     """
     xy, lengths = xy_m.copy(), plan.lengths(z_m, heights_first=True)
     occupied = np.zeros(len(xy), dtype=bool)
@@ -81,43 +116,46 @@ def improved_in_plan(plan, xy_m, z_m, held, north=True):
 
 
 def _disagreeing(plan, xy, zeros, lengths, wanted):
-    """(points,) True for points that some of their sights miss by more than noise."""
+    """Mask (points,) of points missed by some of their sights by more than noise."""
     owner, origin, towards = _rays(plan, xy, zeros, wanted)
     d = xy[owner] - origin
     off = np.abs(d[:, 0] * towards[:, 1] - d[:, 1] * towards[:, 0])
+    # A ray that points away from the point misses it completely.
     off = np.where(np.sum(d * towards, axis=1) > 0, off, np.inf)
     bad = off > NOISE * np.linalg.norm(d, axis=1)
     of_arc, centre, radius = _arcs(plan, xy, lengths, wanted)
     wrong = np.abs(np.linalg.norm(xy[of_arc] - centre, axis=1) - radius) > NOISE * radius
-    found = np.zeros(len(xy), dtype=bool)
-    found[owner[bad]] = True
-    found[of_arc[wrong]] = True
-    return found
+    mask = np.zeros(len(xy), dtype=bool)
+    mask[owner[bad]] = True
+    mask[of_arc[wrong]] = True
+    return mask
 
 
-def _place_points(plan, xy, zeros, lengths, needed, wanted, strict):
-    """Write the places of points (points,) that are wanted and have as many sights as needed."""
+def _place_points(plan, xy, zeros, lengths, required, wanted, strict):
+    """Compute wanted points (points,) with enough sights; updates xy in place."""
     owner, origin, towards = _rays(plan, xy, zeros, wanted)
     of_arc, centre, radius = _arcs(plan, xy, lengths, wanted)
     count = np.bincount(np.concatenate([owner, of_arc]), minlength=len(xy))
+    # Sort once; the sights of each point are then a slice.
     by_owner, by_arc = np.argsort(owner, kind="stable"), np.argsort(of_arc, kind="stable")
     edges = np.arange(len(xy) + 1)
     rays_at = np.searchsorted(owner[by_owner], edges)
     arcs_at = np.searchsorted(of_arc[by_arc], edges)
-    for point in np.flatnonzero(wanted & (count >= needed)):
+    for point in np.flatnonzero(wanted & (count >= required)):
         rays = by_owner[rays_at[point] : rays_at[point + 1]]
         arcs = by_arc[arcs_at[point] : arcs_at[point + 1]]
-        found = place(origin[rays], towards[rays], centre[arcs], radius[arcs], strict)
-        if found is not None:
-            xy[point] = found
+        position = place(origin[rays], towards[rays], centre[arcs], radius[arcs], strict)
+        if position is not None:
+            xy[point] = position
 
 
 def _rays(plan, xy, zeros, wanted):
-    """Rays to points that are wanted: point (n,), origin (n, 2), direction (n, 2)."""
+    """Rays to wanted points: point (n,), origin (n, 2), direction (n, 2)."""
     azimuth = plan.reading + zeros[plan.circle]
     known, able = np.isfinite(xy[:, 0]), np.isfinite(azimuth)
     ahead = np.flatnonzero(able & known[plan.station] & wanted[plan.target])
     north = plan.north[plan.circle] & able
+    # An azimuth is known in both directions, so it also gives a ray from target to station.
     back = np.flatnonzero(north & known[plan.target] & wanted[plan.station])
     azimuth = np.concatenate([azimuth[ahead], azimuth[back] + np.pi])
     owner = np.concatenate([plan.target[ahead], plan.station[back]])
@@ -126,7 +164,7 @@ def _rays(plan, xy, zeros, wanted):
 
 
 def _arcs(plan, xy, lengths, wanted):
-    """Arcs on which points that are wanted lie: point (n,), centre (n, 2), radius (n,)."""
+    """Arcs through wanted points: point (n,), centre (n, 2), radius (n,)."""
     low, high = np.divmod(lengths[0], plan.points)
     known = np.isfinite(xy[:, 0])
     up, down = known[low] & wanted[high], known[high] & wanted[low]
@@ -136,29 +174,51 @@ def _arcs(plan, xy, lengths, wanted):
 
 
 def place(origin, towards, centre, radius, controlled=False):
-    """Where a point stands (2,) that lies on rays (n, 2), (n, 2) and arcs (m, 2), (m,), or None."""
+    """Position of a point on rays and arcs.
+
+    Parameters
+    ----------
+    origin, towards : ndarray, shape (n, 2)
+        Origins and directions of the rays.
+    centre : ndarray, shape (m, 2)
+    radius : ndarray, shape (m,)
+    controlled : bool
+        Whether the best position must be better than all others.
+
+    Returns
+    -------
+    ndarray, shape (2,), or None
+    """
     rays, arcs = _few(len(origin)), _few(len(centre))
-    found = [_crossing(origin[[i, j]], towards[[i, j]]) for i, j in combinations(rays, 2)]
-    found += [_cut(origin[i], towards[i], centre[j], radius[j]) for i in rays for j in arcs]
-    found += [_arc_cuts(centre[[i, j]], radius[[i, j]]) for i, j in combinations(arcs, 2)]
-    found = np.concatenate([np.zeros((0, 2)), *found])
-    if not len(found):
+    intersections = [_crossing(origin[[i, j]], towards[[i, j]]) for i, j in combinations(rays, 2)]
+    intersections += [_cut(origin[i], towards[i], centre[j], radius[j]) for i in rays for j in arcs]
+    intersections += [_arc_cuts(centre[[i, j]], radius[[i, j]]) for i, j in combinations(arcs, 2)]
+    intersections = np.concatenate([np.zeros((0, 2)), *intersections])
+    if not len(intersections):
         return None
-    d = found[:, None] - origin[None]
+    d = intersections[:, None] - origin[None]
     along = np.einsum("kni,ni->kn", d, towards)
     across = np.abs(d[..., 0] * towards[:, 1] - d[..., 1] * towards[:, 0])
     away = np.linalg.norm(d, axis=-1)
-    of_arcs = np.linalg.norm(found[:, None] - centre[None], axis=-1)
+    of_arcs = np.linalg.norm(intersections[:, None] - centre[None], axis=-1)
+    # Behind the origin of a ray the misfit is the whole distance.
     misfit = np.where(along > 0, across, away).sum(axis=1)
     misfit = misfit + np.abs(of_arcs - radius).sum(axis=1)
-    return choose_place(found, misfit, np.median(np.hstack([away, of_arcs])), controlled)
+    return choose_place(intersections, misfit, np.median(np.hstack([away, of_arcs])), controlled)
 
 
 def choose_place(places, misfit, size, controlled=False):
-    """The place with the smallest misfit, or None when another one fits as well.
+    """The position with the smallest misfit, or None if another fits equally well.
 
-    places (k, 2 or more), misfit (k,), size of the sights; where `controlled` the best must stand
-    out, else it is enough that they do not all fit
+    Parameters
+    ----------
+    places : ndarray, shape (k, 2 or more)
+    misfit : ndarray, shape (k,)
+    size : float
+        Typical length of the sights.
+    controlled : bool
+        True: the best position must be clearly better than all others; False: it is enough that not
+        all fit.
     """
     best = int(np.argmin(misfit))
     limit = NOISE * size + (RIVAL * misfit[best] if controlled else 0.0)
@@ -167,11 +227,12 @@ def choose_place(places, misfit, size, controlled=False):
 
 
 def _few(count):
+    """At most MOST evenly spaced indices."""
     return np.unique(np.linspace(0, count - 1, min(count, MOST)).astype(int)) if count else []
 
 
 def _crossing(origin, towards):
-    """Where two rays cross (0 or 1, 2)."""
+    """Intersection of two rays (0 or 1, 2)."""
     sine = towards[0, 0] * towards[1, 1] - towards[0, 1] * towards[1, 0]
     if abs(sine) < THIN:
         return np.zeros((0, 2))
@@ -181,10 +242,11 @@ def _crossing(origin, towards):
 
 
 def _cut(origin, towards, centre, radius):
-    """Where a ray cuts an arc (0 to 2, 2)."""
+    """Intersections of a ray and an arc (0 to 2, 2)."""
     d = origin - centre
     middle = -float(d @ towards)
     square = radius**2 - (float(d @ d) - middle**2)
+    # A ray that just misses the arc, within measuring errors, touches it.
     if square < -(0.05 * radius**2):
         return np.zeros((0, 2))
     half = np.sqrt(max(square, 0.0))
@@ -193,7 +255,7 @@ def _cut(origin, towards, centre, radius):
 
 
 def _arc_cuts(centre, radius):
-    """Where two arcs cut (0 or 2, 2)."""
+    """Intersections of two arcs (0 or 2, 2)."""
     d = centre[1] - centre[0]
     base = float(np.hypot(*d))
     if base < THIN * radius.max():
@@ -207,36 +269,48 @@ def _arc_cuts(centre, radius):
     return centre[0] + along * u + np.array([[side], [-side]]) * across
 
 
-def _place_stations(plan, xy, lengths, needed, wanted, strict):
-    """Write the places of stations that are wanted: free stationing, resection."""
+def _place_stations(plan, xy, lengths, required, wanted, strict):
+    """Compute wanted stations by free stationing and resection; updates xy in place."""
     known = np.isfinite(xy[:, 0])
     rows = np.flatnonzero(known[plan.target] & wanted[plan.station] & ~plan.north[plan.circle])
     circles, count = np.unique(plan.circle[rows], return_counts=True)
-    done = np.zeros(len(xy), dtype=bool)
+    is_placed = np.zeros(len(xy), dtype=bool)
     for circle in circles[np.argsort(-count, kind="stable")]:
         station = plan.at[circle]
-        mine = rows[plan.circle[rows] == circle]
-        if done[station] or len(mine) < needed:
+        rows_of_circle = rows[plan.circle[rows] == circle]
+        if is_placed[station] or len(rows_of_circle) < required:
             continue
-        target = plan.target[mine]
-        length = look_up(*lengths, plan.pairs(plan.station[mine], target))
-        found = free_station(xy[target], plan.reading[mine], length, strict)
-        if found is not None:
-            xy[station], done[station] = found, True
+        target = plan.target[rows_of_circle]
+        length = look_up(*lengths, plan.pairs(plan.station[rows_of_circle], target))
+        position = free_station(xy[target], plan.reading[rows_of_circle], length, strict)
+        if position is not None:
+            xy[station], is_placed[station] = position, True
 
 
 def free_station(targets, readings, lengths, controlled=False):
-    """Where an instrument stands (2,) that sees known targets (n, 2), or None.
+    """Position of an instrument from sights to known targets.
 
-    readings  (n,) rad on a circle with unknown zero      lengths  (n,) m, nan where not measured
+    Parameters
+    ----------
+    targets : ndarray, shape (n, 2)
+    readings : ndarray, shape (n,)
+        Rad, on a circle with unknown zero.
+    lengths : ndarray, shape (n,)
+        m; nan: not measured.
+    controlled : bool
+        See `choose_place`.
+
+    Returns
+    -------
+    ndarray, shape (2,), or None
     """
     few = _few(len(targets))
     triples = np.array(list(combinations(few, 3)), dtype=int).reshape(-1, 3)
     poses = [_poses_from_three(targets[triples], readings[triples])]
     taped = [i for i in few if np.isfinite(lengths[i])]
-    poses += [_from_two(targets[[i, j]], readings[[i, j]], lengths[[i, j]])
+    poses += [_pose_from_two(targets[[i, j]], readings[[i, j]], lengths[[i, j]])
               for i, j in combinations(taped, 2)]  # fmt: skip
-    poses += [_from_angle(targets[[i, j]], readings[[i, j]], lengths[i])
+    poses += [_poses_from_angle(targets[[i, j]], readings[[i, j]], lengths[i])
               for i in taped for j in few if not np.isfinite(lengths[j])]  # fmt: skip
     poses = np.concatenate(poses)
     poses = poses[np.isfinite(poses).all(axis=1)]
@@ -245,51 +319,57 @@ def free_station(targets, readings, lengths, controlled=False):
     d = targets[None] - poses[:, None, :2]
     away = np.linalg.norm(d, axis=-1)
     turn = _wrapped(np.arctan2(d[..., 0], d[..., 1]) - readings - poses[:, 2:])
+    # Angular misfits become lengths at the distance of the target, comparable with distances.
     misfit = (away * np.abs(turn)).sum(axis=1) + np.nansum(np.abs(away - lengths), axis=1)
-    found = choose_place(poses, misfit, np.median(away), controlled)
-    return None if found is None else found[:2]
+    best = choose_place(poses, misfit, np.median(away), controlled)
+    return None if best is None else best[:2]
 
 
 def _poses_from_three(targets, readings):
-    """Poses (k, 3) x, y, zero from directions (t, 3) to the triples of targets (t, 3, 2).
+    """Poses (k, 3) x, y, zero from directions to triples of targets.
 
-    With a, b = cos, sin of the zero, P = x a - y b and Q = x b + y a each direction is linear:
-    a (X cos - Y sin) - b (X sin + Y cos) - P cos + Q sin = 0. A triple gives no pose where the
-    station lies on a circle with its targets.
+    With a, b = cos, sin of the zero, P = x a - y b and Q = x b + y a, each direction is linear: a
+    (X cos - Y sin) - b (X sin + Y cos) - P cos + Q sin = 0. A triple gives no pose if the station
+    lies on the circle through its targets.
+
+    Parameters
+    ----------
+    targets : ndarray, shape (t, 3, 2)
+    readings : ndarray, shape (t, 3)
     """
     s, c = np.sin(readings), np.cos(readings)
     middle = targets.mean(axis=1)
     x, y = np.moveaxis(targets - middle[:, None], -1, 0)
-    # coordinates in units of the triple's size, so that all columns have a size of about 1
+    # Coordinates in units of the triple's size give all columns a norm of about 1.
     size = np.maximum(np.maximum(np.abs(x), np.abs(y)).max(axis=1), 1e-9)[:, None]
     rows = np.stack([(x * c - y * s) / size, -(x * s + y * c) / size, -c, s], axis=-1)
     _, singular, v = np.linalg.svd(rows)
     a, b, p, q = v[:, 3].T
     square = a * a + b * b
-    kept = (singular[:, 2] >= 1e-4 * singular[:, 0]) & (square >= 1e-12)
-    a, b, p, q, square = a[kept], b[kept], p[kept], q[kept], square[kept]
-    xy = size[kept] * np.stack([p * a + q * b, q * a - p * b], axis=-1) / square[:, None]
+    is_valid = (singular[:, 2] >= 1e-4 * singular[:, 0]) & (square >= 1e-12)
+    a, b, p, q, square = a[is_valid], b[is_valid], p[is_valid], q[is_valid], square[is_valid]
+    xy = size[is_valid] * np.stack([p * a + q * b, q * a - p * b], axis=-1) / square[:, None]
     zero = np.arctan2(b, a)
-    # a and b may both have the wrong sign: then the targets are behind the telescope
-    turned = readings[kept] + zero[:, None]
+    # The null vector has an arbitrary sign; the wrong sign puts the targets behind the telescope.
+    turned = readings[is_valid] + zero[:, None]
     ahead = np.stack([np.sin(turned), np.cos(turned)], axis=-1)
-    offsets = targets[kept] - middle[kept, None] - xy[:, None]
+    offsets = targets[is_valid] - middle[is_valid, None] - xy[:, None]
     zero[np.sum(offsets * ahead, axis=(1, 2)) < 0] += np.pi
-    return np.column_stack([xy + middle[kept], zero])
+    return np.column_stack([xy + middle[is_valid], zero])
 
 
-def _from_two(targets, readings, lengths):
+def _pose_from_two(targets, readings, lengths):
     """Pose (0 or 1, 3) from directions and lengths to two targets."""
     local = lengths[:, None] * np.column_stack([np.sin(readings), np.cos(readings)])
-    there, here = targets[1] - targets[0], local[1] - local[0]
-    if min(np.hypot(*there), np.hypot(*here)) < THIN * lengths.max():
+    base, local_base = targets[1] - targets[0], local[1] - local[0]
+    if min(np.hypot(*base), np.hypot(*local_base)) < THIN * lengths.max():
         return np.zeros((0, 3))
-    zero = np.arctan2(*there) - np.arctan2(*here)
+    zero = np.arctan2(*base) - np.arctan2(*local_base)
     ahead = lengths[:, None] * np.column_stack([np.sin(readings + zero), np.cos(readings + zero)])
     return np.array([[*(targets - ahead).mean(axis=0), zero]])
 
 
-def _from_angle(targets, readings, length):
+def _poses_from_angle(targets, readings, length):
     """Poses (k, 3) from directions to two targets and the length to the first."""
     angle = _wrapped(readings[1] - readings[0])
     d = targets[1] - targets[0]
@@ -297,13 +377,15 @@ def _from_angle(targets, readings, length):
     if abs(np.sin(angle)) < THIN or base < THIN * length:
         return np.zeros((0, 3))
     middle, across = targets.mean(axis=0), np.array([-d[1], d[0]])
-    found = []
-    for side in (1.0, -1.0):  # the station sees the base under the angle from two circles
+    positions = []
+    # The locus of a constant angle over the base is two circles (inscribed angle theorem).
+    for side in (1.0, -1.0):
         centre = middle + side * across / (2 * np.tan(angle))
         radius = base / (2 * abs(np.sin(angle)))
-        found.append(_arc_cuts(np.stack([targets[0], centre]), np.array([length, radius])))
-    xy = np.concatenate(found)
+        positions.append(_arc_cuts(np.stack([targets[0], centre]), np.array([length, radius])))
+    xy = np.concatenate(positions)
     first = np.arctan2(*(targets[0] - xy).T)
     second = np.arctan2(*(targets[1] - xy).T)
+    # Only one arc of each circle has the measured angle; the other has its supplement.
     right = np.abs(_wrapped(second - first - angle)) < 0.05
     return np.column_stack([xy, first - readings[0]])[right]

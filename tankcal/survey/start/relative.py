@@ -1,10 +1,10 @@
-"""Where two photos stand to one another, from nothing but the points that both show.
+"""Relative orientation of two photos from common points only.
 
-With unit rays f1 and f2 to one point, the first photo at the origin, the second at b with rotation
-R, the rays and the base lie in a plane: f2' R [b]x f1 = 0. Five points give up to ten matrices
-E = R [b]x; many fives are tried and the one that points agree with best wins, points on a plane
-included. Source: Stewenius, Engels & Nister 2006, Recent developments on direct relative
-orientation; Hartley & Zisserman 2004, ch. 9 (decomposition).
+Let f1 and f2 be unit rays to one point, the first photo at the origin, the second at b with
+rotation R. Rays and base lie in a plane: f2' R [b]x f1 = 0. Five points give up to ten matrices E =
+R [b]x. Many samples of five are tried, and the matrix with which most points agree is used, also
+for points on a plane. Source: Stewenius, Engels & Nister 2006, Recent developments on direct
+relative orientation; Hartley & Zisserman 2004, ch. 9 (decomposition).
 """
 
 from dataclasses import dataclass
@@ -16,15 +16,15 @@ import numpy as np
 from tankcal.geometry.rotations import apply_small_rotation
 from tankcal.survey.start.resection import bearings
 
-FIVES = 150  # samples of five points; nine in ten of them may hold a blunder
-JUDGES = 200  # points that are used of more
-TRIED = 30  # matrices that are looked at, the best first
-WORSE = 10.0  # times the best error, beyond which a matrix is not refined
+FIVES = 150  # samples of five points; nine in ten of them may contain a blunder
+JUDGES = 200  # points used for comparison if there are more
+TRIED = 30  # matrices examined, the best first
+WORSE = 10.0  # ratio to the best error, above which a matrix is not refined
 REFINING_STEPS = 10
-SAME_RAD = 0.02  # poses closer than that are one and the same
-RIVAL = 3.0  # a second pose counts when its error is below this multiple of the best one's
+SAME_RAD = 0.02  # difference below which two poses are equal
+RIVAL = 3.0  # error ratio to the best pose, below which another pose is returned
 FLOOR = 1e-5  # errors below are measuring noise, rad
-IN_FRONT = 0.7  # share of points that must lie before both cameras
+IN_FRONT = 0.7  # share of points required in front of both cameras
 
 _CUBES = list(combinations_with_replacement(range(3), 3))
 _SQUARES = list(combinations_with_replacement(range(3), 2))
@@ -40,10 +40,16 @@ _EVEN[[0, 2, 1], [2, 1, 0], [1, 0, 2]] = -1.0
 
 @dataclass(frozen=True)
 class Pair:
-    """Two photos: the second one's rotation (3, 3) and place (3,), of length 1, from the first.
+    """Relative pose of two photos: rotation (3, 3) and position (3,), of length 1, of the second.
 
-    error     misfit: geometric mean of the angles between rays and epipolar planes, rad
-    parallax  median angle between two rays to a point, rad
+    Attributes
+    ----------
+    rotation : ndarray, shape (3, 3)
+    base : ndarray, shape (3,)
+    error : float
+        Geometric mean of the angles between rays and epipolar planes, rad.
+    parallax : float
+        Median angle between two rays to a point, rad.
     """
 
     rotation: np.ndarray
@@ -53,20 +59,33 @@ class Pair:
 
 
 def relative_poses(first, second, seed):
-    """Pairs that fit ideal image points over c (n, 2) of two photos, n at least 6, the best first.
+    """Relative poses of two photos, the best first.
 
-    More than one is returned when they fit (nearly) equally well, as those of a plane may do. What
-    was found is remembered: a survey that does not fit is tried again and again in other ways.
+    More than one pose is returned if several fit nearly equally well, as for points on a plane.
+    Results are cached, because a survey that does not fit is adjusted repeatedly with other
+    assumptions.
 
-    seed  of the samples that are tried
+    Parameters
+    ----------
+    first, second : ndarray, shape (n, 2)
+        Ideal image points over c, n at least 6.
+    seed : int
+        Of the samples.
+
+    Returns
+    -------
+    list of Pair
     """
-    first, second = (np.ascontiguousarray(one, dtype=float).tobytes() for one in (first, second))
+    first, second = (
+        np.ascontiguousarray(ideal, dtype=float).tobytes() for ideal in (first, second)
+    )
     return list(_remembered(first, second, seed))
 
 
 @lru_cache(maxsize=256)
 def _remembered(first, second, seed):
-    first, second = (np.frombuffer(one).reshape(-1, 2) for one in (first, second))
+    """`relative_poses` of arrays as bytes, which a cache can use as a key."""
+    first, second = (np.frombuffer(item).reshape(-1, 2) for item in (first, second))
     n, rng = len(first), np.random.default_rng(seed)
     judges = rng.choice(n, JUDGES, replace=False) if n > JUDGES else np.arange(n)
     f1, f2 = bearings(first[judges]), bearings(second[judges])
@@ -75,40 +94,45 @@ def _remembered(first, second, seed):
     if not len(matrices):
         return []
     errors = _misfit(epipolar_errors(matrices, f1, f2))
-    found, rough = [], []
+    pairs, rough = [], []
     for best in np.argsort(errors)[:TRIED]:
-        if found and errors[best] > WORSE * max(found[0].error, FLOOR):
+        if pairs and errors[best] > WORSE * max(pairs[0].error, FLOOR):
             break
         pose = _decomposed(matrices[best], f1, f2)
-        if pose is None or any(_alike(pose, other) for other in rough):
+        if pose is None or any(_alike(pose, pose_before) for pose_before in rough):
             continue
         rough.append(pose)
         pair = _pair(pose, f1, f2)
-        if not any(_alike((pair.rotation, pair.base), (o.rotation, o.base)) for o in found):
-            found.append(pair)
-    found.sort(key=lambda pair: pair.error)
-    return [one for one in found if one.error <= RIVAL * max(found[0].error, FLOOR)]
+        if not any(_alike((pair.rotation, pair.base), (o.rotation, o.base)) for o in pairs):
+            pairs.append(pair)
+    pairs.sort(key=lambda pair: pair.error)
+    return [item for item in pairs if item.error <= RIVAL * max(pairs[0].error, FLOOR)]
 
 
 def essential_matrices(f1, f2):
-    """Matrices (k, 3, 3) with f2' E f1 = 0 for fives of unit rays (t, 5, 3)."""
+    """Essential matrices (k, 3, 3) with f2' E f1 = 0 from samples of five unit rays (t, 5, 3)."""
     rows = np.einsum("tni,tnj->tnij", f2, f1).reshape(-1, 5, 9)
+    # Five equations leave a null space of dimension four for the nine elements of E.
     basis = np.linalg.svd(rows)[2][:, 5:].reshape(-1, 4, 3, 3)
     cubic = _constraints(basis)
     lead = cubic[:, :, :10]
     sound = np.abs(np.linalg.det(lead)) > 0
     basis, cubic = basis[sound], cubic[sound]
+    # Eliminate the ten cubic monomials to obtain the action matrix of multiplication by x.
     reduced = np.linalg.solve(cubic[:, :, :10], cubic[:, :, 10:])
     action = np.zeros((len(basis), 10, 10))
-    for row in range(6):  # x times a square is a cube, which the constraints reduce
+    # x times a square is a cubic monomial, which the constraints reduce.
+    for row in range(6):
         cube = _PLACE[tuple(sorted((0, *_SQUARES[row])))]
         action[:, row] = -reduced[:, cube]
-    for row, square in ((6, 0), (7, 1), (8, 2), (9, 6)):  # x times x, y, z and 1
+    # x times x, y, z and 1 are quadratic or linear monomials themselves.
+    for row, square in ((6, 0), (7, 1), (8, 2), (9, 6)):
         action[:, row, square] = 1.0
     sound = np.isfinite(action).all(axis=(1, 2))
     _, vectors = np.linalg.eig(action[sound])
     with np.errstate(divide="ignore", invalid="ignore"):
         xyz = vectors[:, 6:9] / vectors[:, 9:]
+    # The eigenvectors hold the solutions; complex ones have no geometric meaning.
     real = np.isfinite(xyz).all(axis=1) & (np.abs(xyz.imag).max(axis=1) < 1e-6)
     which, number = np.nonzero(real)
     a = np.column_stack([xyz.real[which, :, number], np.ones(len(which))])
@@ -117,9 +141,10 @@ def essential_matrices(f1, f2):
 
 
 def _constraints(basis):
-    """The ten cubic equations (t, 10, 20) in the multipliers of basis matrices (t, 4, 3, 3)."""
+    """Ten cubic equations (t, 10, 20) in the multipliers of basis matrices (t, 4, 3, 3)."""
     product = np.einsum("aipq,ajrq->aijpr", basis, basis)
     trace = np.einsum("aijpp->aij", product)
+    # 2 E E' E - trace(E E') E = 0 gives nine equations, det E = 0 the tenth.
     cubes = 2 * np.einsum("aijpr,akrs->aijkps", product, basis)
     cubes -= np.einsum("aij,akps->aijkps", trace, basis)
     rows = basis[:, :, 0], basis[:, :, 1], basis[:, :, 2]
@@ -130,29 +155,32 @@ def _constraints(basis):
 
 
 def epipolar_errors(matrices, f1, f2):
-    """Angles (k, n), rad, by which rays (n, 3) leave the epipolar planes of matrices (k, 3, 3)."""
+    """Angles (k, n), rad, between rays (n, 3) and the epipolar planes of matrices (k, 3, 3)."""
     planes_2 = np.einsum("kij,nj->kni", matrices, f1)
     planes_1 = np.einsum("kij,ni->knj", matrices, f2)
     off = np.abs(np.einsum("kni,ni->kn", planes_2, f2))
+    # Sampson distance: the misfit over its gradient in both images.
     square = np.sum(planes_2**2, axis=-1) + np.sum(planes_1**2, axis=-1)
     return off / np.sqrt(np.maximum(square, 1e-30))
 
 
 def _misfit(errors):
-    """Geometric mean (k,) of the errors (k, n), the five smallest left out: any five fit exactly.
+    """Geometric mean (k,) of the errors (k, n) without the five smallest, which fit by
+    construction.
 
-    A blunder counts the same wherever the truth lies; of few points, a wrong pose that many happen
-    to agree with does not win against one that all agree with but for noise.
+    A blunder has the same effect wherever the true ray lies. With few points, a wrong pose that
+    fits many of them by chance does not replace a pose that fits all within noise.
     """
     others = np.partition(errors, 4, axis=1)[:, 5:]
     return np.exp(np.mean(np.log(others**2 + FLOOR**2), axis=1) / 2)
 
 
 def _decomposed(matrix, f1, f2):
-    """Rotation and base of a matrix, or None when most points lie behind the cameras."""
+    """Rotation and base of a matrix, or None if most points lie behind the cameras."""
     u, _, v = np.linalg.svd(matrix.T)
     w = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     best, most = None, IN_FRONT
+    # E allows two rotations and two signs of the base; points in front of both cameras decide.
     for middle in (w, w.T):
         rotation = (u @ middle @ v).T
         rotation = rotation * np.sign(np.linalg.det(rotation))
@@ -171,49 +199,55 @@ def _pair(pose, f1, f2):
 
 
 def _in_front(rotation, base, f1, f2):
-    """True (n,) where both rays meet before the cameras."""
-    there = f2 @ rotation
-    cosine = np.sum(f1 * there, axis=1)
-    a, b = f1 @ base, there @ base
+    """Mask (n,) of points where both rays intersect in front of the cameras."""
+    second_rays = f2 @ rotation
+    cosine = np.sum(f1 * second_rays, axis=1)
+    a, b = f1 @ base, second_rays @ base
     return (a - cosine * b > 0) & (cosine * a - b > 0)
 
 
 def _refined(rotation, base, f1, f2):
-    """Rotation and base after Gauss-Newton steps with weights that fall off, and the error."""
+    """Refine rotation and base by Gauss-Newton with decreasing weights; return them and the
+    error."""
     error = np.inf
     for _ in range(REFINING_STEPS):
         off, a = _linearised(rotation, base, f1, f2)
         scale = max(float(np.median(np.abs(off))), 1e-9)
         root = 1 / np.sqrt(1 + (off / (3 * scale)) ** 2)
         step = np.linalg.lstsq(a * root[:, None], -off * root, rcond=None)[0]
+        # The base has length 1, so it moves in two directions only.
         across = np.linalg.svd(base[None])[2][1:]
         turn = apply_small_rotation(rotation[None], step[None, :3])[0]
         moved = base + step[3:] @ across
         moved = moved / np.linalg.norm(moved)
         cross = np.cross(np.eye(3), moved)
         matrix = turn @ -cross
-        found = float(_misfit(epipolar_errors(matrix[None], f1, f2))[0])
-        if not found < error:
+        new_error = float(_misfit(epipolar_errors(matrix[None], f1, f2))[0])
+        if not new_error < error:
             break
-        rotation, base, error = turn, moved, found
+        rotation, base, error = turn, moved, new_error
         if np.abs(step).max() < 1e-9:
             break
     return rotation, base, error
 
 
 def _linearised(rotation, base, f1, f2):
-    """Sines (n,) of rays against epipolar planes, derivatives (n, 5) by rotation and base."""
-    there = f2 @ rotation
+    """Sines (n,) between rays and epipolar planes, and derivatives (n, 5) by rotation and base."""
+    second_rays = f2 @ rotation
     plane = np.cross(base, f1)
     length = np.maximum(np.linalg.norm(plane, axis=1), 1e-9)
     across = np.linalg.svd(base[None])[2][1:]
     a = np.empty((len(f1), 5))
     a[:, :3] = -np.cross(f2, plane @ rotation.T)  # d (R'f2).p for R <- exp([d]x) R
-    a[:, 3:] = np.stack([np.sum(np.cross(one, f1) * there, axis=1) for one in across], axis=1)
-    return np.sum(plane * there, axis=1) / length, a / length[:, None]
+    a[:, 3:] = np.stack(
+        [np.sum(np.cross(direction, f1) * second_rays, axis=1) for direction in across], axis=1
+    )
+    return np.sum(plane * second_rays, axis=1) / length, a / length[:, None]
 
 
-def _alike(one, other):
-    """Whether two poses (rotation, base) are one and the same."""
-    cosine = (np.trace(one[0] @ other[0].T) - 1) / 2
-    return np.arccos(np.clip(cosine, -1, 1)) < SAME_RAD and one[1] @ other[1] > np.cos(2 * SAME_RAD)
+def _alike(first, second):
+    """Whether two poses (rotation, base) are equal within SAME_RAD."""
+    cosine = (np.trace(first[0] @ second[0].T) - 1) / 2
+    return np.arccos(np.clip(cosine, -1, 1)) < SAME_RAD and first[1] @ second[1] > np.cos(
+        2 * SAME_RAD
+    )

@@ -1,4 +1,4 @@
-"""How well a piece agrees with its images, and what is done where it does not."""
+"""Agreement of a piece with its images, and repair of photos that contradict it."""
 
 from dataclasses import replace
 
@@ -8,16 +8,27 @@ from tankcal.survey.start.photographs import grow_by_photos
 from tankcal.survey.start.plan import medians
 from tankcal.survey.start.resection import agreed_error, bearings, image_errors
 
-MENDING = 2  # rounds in which photos that fit badly are found again
-AT_ODDS = 0.02  # error over c of a photo, or a known point, that is not where it should be
-WORSE = 5.0  # times the median error of the photos, beyond which one fits badly
-SMALL_ERROR = 3e-3  # error over c that is not looked into: 0.3 mm at c = 100 mm
+MENDING = 2  # rounds in which poorly fitting photos are recomputed
+AT_ODDS = 0.02  # error over c above which a photo or a known point is wrong
+WORSE = 5.0  # ratio to the median error of the photos, above which a photo fits poorly
+SMALL_ERROR = 3e-3  # error over c that is always accepted: 0.3 mm at c = 100 mm
 
 
 def repair_photos(sights, piece, held, rng, wall=None):
-    """The Piece, photos that fit far worse than the others found again from what these say.
+    """Recompute photos that fit far worse than the others.
 
-    held  (photos,) True for those that stay
+    Parameters
+    ----------
+    sights : sequence of Sight
+    piece : Piece
+    held : ndarray of bool, shape (photos,)
+        Photos that stay.
+    rng : numpy.random.Generator
+    wall : Wall, optional
+
+    Returns
+    -------
+    Piece
     """
     for _ in range(MENDING):
         errors = photo_errors(sights, piece)
@@ -25,6 +36,7 @@ def repair_photos(sights, piece, held, rng, wall=None):
         bad &= piece.oriented & ~held
         if not bad.any():
             return piece
+        # Points from photos may be spoilt by the bad ones, so they are recomputed as well.
         less = replace(
             piece,
             xyz_m=np.where(piece.by_photos[:, None], np.nan, piece.xyz_m),
@@ -32,6 +44,7 @@ def repair_photos(sights, piece, held, rng, wall=None):
             rotation=np.where(bad[:, None, None], np.nan, piece.rotation),
         )
         again = grow_by_photos(sights, less, rng, wall)
+        # A repair that loses photos is not one.
         if again.oriented.sum() < piece.oriented.sum():
             return piece
         piece = again
@@ -39,36 +52,46 @@ def repair_photos(sights, piece, held, rng, wall=None):
 
 
 def _middle(errors):
+    """Median of the finite errors, or 0."""
     return float(np.nanmedian(errors)) if np.isfinite(errors).any() else 0.0
 
 
 def photo_errors(sights, piece):
-    """Errors (photos,) over c that more than half of the points of each photo keep, else nan."""
+    """Errors (photos,) over c met by more than half of the points of each photo; nan: not
+    oriented."""
     photos = zip(range(len(sights)), piece.oriented, strict=True)
     return np.array(
-        [photo_error(sights[i], piece, i, most=True) if done else np.nan for i, done in photos]
+        [
+            photo_error(sights[i], piece, i, most=True) if is_oriented else np.nan
+            for i, is_oriented in photos
+        ]
     )
 
 
 def contradictions(sights, piece, sure):
-    """How much a Piece is at odds with its images: share of photos and of known points that are.
+    """Share of photos, plus share of known points, that contradict the images.
 
-    sure  (points,) True for points whose places are known for certain
+    Parameters
+    ----------
+    sights : sequence of Sight
+    piece : Piece
+    sure : ndarray of bool, shape (points,)
+        Points with certain positions.
     """
     if not sights:
         return 0.0
     errors = photo_errors(sights, piece)
-    found = [_errors(sights[i], piece, i) for i in np.flatnonzero(piece.oriented)]
-    number = np.concatenate([one for one, _ in found] + [np.zeros(0, dtype=int)])
-    off = np.concatenate([one for _, one in found] + [np.zeros(0)])
-    mine = sure[number]
-    _, middle = medians(number[mine], np.minimum(off[mine], 1e3))
+    errors_of_photos = [_errors(sights[i], piece, i) for i in np.flatnonzero(piece.oriented)]
+    number = np.concatenate([part for part, _ in errors_of_photos] + [np.zeros(0, dtype=int)])
+    off = np.concatenate([part for _, part in errors_of_photos] + [np.zeros(0)])
+    is_sure = sure[number]
+    _, middle = medians(number[is_sure], np.minimum(off[is_sure], 1e3))
     wrong = float(np.mean(middle > AT_ODDS)) if len(middle) else 0.0
     return float(np.mean(~(errors < AT_ODDS))) + wrong
 
 
 def _errors(sight, piece, photo):
-    """Known points (n,) that a photo sees, and their errors (n,) over c."""
+    """Known points (n,) in a photo, and their errors (n,) over c."""
     known = piece.known[sight.point]
     points, ideal = piece.xyz_m[sight.point[known]], sight.ideal[known]
     pose = piece.place_m[photo][None], piece.rotation[photo][None]
@@ -76,7 +99,7 @@ def _errors(sight, piece, photo):
 
 
 def guess_places(sights, piece):
-    """The Piece with places, on a ray, of points whose rays from two photos or more do not meet."""
+    """Place points on a ray if their rays from two or more photos do not intersect."""
     photos = np.flatnonzero(piece.oriented)
     rays = np.bincount(
         np.concatenate([sights[i].point for i in photos] + [np.zeros(0, dtype=int)]),
@@ -85,20 +108,27 @@ def guess_places(sights, piece):
     xyz, known = piece.xyz_m.copy(), piece.known
     for photo in photos:
         sight = sights[photo]
-        seen = known[sight.point]
-        left = ~seen & (rays[sight.point] > 1) & np.isnan(xyz[sight.point]).all(axis=1)
-        if seen.any() and left.any():
-            away = xyz[sight.point[seen]] - piece.place_m[photo]
+        is_known = known[sight.point]
+        unplaced = ~is_known & (rays[sight.point] > 1) & np.isnan(xyz[sight.point]).all(axis=1)
+        if is_known.any() and unplaced.any():
+            away = xyz[sight.point[is_known]] - piece.place_m[photo]
+            # The median distance of the known points in the photo is the best guess of the depth.
             far = np.median(np.linalg.norm(away, axis=1))
-            ray = bearings(sight.ideal[left]) @ piece.rotation[photo]
-            xyz[sight.point[left]] = piece.place_m[photo] + far * ray
+            ray = bearings(sight.ideal[unplaced]) @ piece.rotation[photo]
+            xyz[sight.point[unplaced]] = piece.place_m[photo] + far * ray
     return replace(piece, xyz_m=xyz)
 
 
 def photo_error(sight, piece, photo, most=False):
-    """Median error over c of a photo's image points that show known points; nan: no such point.
+    """Median error over c of a photo's known points; nan: no such point.
 
-    most  the error that more than half of them keep, as resection judges
+    Parameters
+    ----------
+    sight : Sight
+    piece : Piece
+    photo : int
+    most : bool
+        True: the error met by more than half of the points, as in resection.
     """
     errors = _errors(sight, piece, photo)[1][None]
     if not errors.size:

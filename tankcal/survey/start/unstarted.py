@@ -1,4 +1,4 @@
-"""What is left without a start value, in words."""
+"""Messages about unknowns without start values."""
 
 import numpy as np
 
@@ -12,16 +12,35 @@ LISTED = 10
 
 
 class SeveralPlacesError(SolutionError):
-    """What was measured is met at several places: no mistake, but a reading too few."""
+    """Several positions fit the measurements: not a mistake, but one reading too few."""
 
 
 def refuse_missing(survey, sights, xyz_m, piece, sets, reasons, why=lambda point: None):
-    """Coordinates (points, 3) without gaps; points that nothing determines stand in the middle.
+    """Complete coordinates, or raise an error that lists the missing start values.
 
-    Those have too few observations for an adjustment, too, which sets them aside by name. Raises
-    SolutionError when a photo, a point that something determines, or a circle has no start.
+    Points with too few observations take the mean position; the adjustment later omits them by
+    name.
 
-    why  why(point) -> what refuses a point without a place, see `unfixed_point_error`; or None
+    Parameters
+    ----------
+    survey : network.Survey
+    sights : sequence of Sight
+    xyz_m : ndarray, shape (points, 3)
+    piece : Piece
+    sets : ndarray, shape (sets,)
+    reasons : list of str
+    why : callable
+        why(point) returns the error of a point without position, see `unfixed_point_error`, or
+        None.
+
+    Returns
+    -------
+    ndarray, shape (points, 3)
+
+    Raises
+    ------
+    SolutionError
+        If a photo, a point with enough observations, or a circle has no start value.
     """
     hopeless = survey.values_of_points() < FEWEST
     missing = np.isnan(xyz_m) & ~hopeless[:, None]
@@ -44,11 +63,12 @@ def refuse_missing(survey, sights, xyz_m, piece, sets, reasons, why=lambda point
                     "photo_of_points", "photo {name} ({count} known points)", name=name, count=count
                 )
             )
-    whole = np.flatnonzero(missing[:, :2].any(axis=1))
-    points = [message("named_point", "point {point}", point=survey.points[i]) for i in whole]
+    without_plan = np.flatnonzero(missing[:, :2].any(axis=1))
+    points = [message("named_point", "point {point}", point=survey.points[i]) for i in without_plan]
     told += points if len(points) <= LISTED else [list_some(points, LISTED)]
     flat = np.isfinite(xyz_m[:, :2]).all(axis=1) & np.isnan(xyz_m[:, 2])
     level = np.flatnonzero(flat if (flat & ~hopeless).any() else flat & ~hopeless)
+    # Circles follow from points, so they are listed only if no point is missing.
     if not told:
         unknown = [
             message("named_set", "orientation of direction set {number}", number=number)
@@ -61,38 +81,49 @@ def refuse_missing(survey, sights, xyz_m, piece, sets, reasons, why=lambda point
     if len(level):
         sentences.append(_no_heights(survey, level))
     if sentences:
-        errors = [one for one in map(why, whole[:LISTED]) if one is not None]
+        errors = [item for item in map(why, without_plan[:LISTED]) if item is not None]
         several = len(errors) == len(told) and all(
-            isinstance(one, SeveralPlacesError) for one in errors
+            isinstance(item, SeveralPlacesError) for item in errors
         )
         kind = SeveralPlacesError if several and errors else SolutionError
-        texts = [*sentences, *(one.args[0] for one in errors), *(one for one in reasons if one)]
+        texts = [
+            *sentences,
+            *(item.args[0] for item in errors),
+            *(item for item in reasons if item),
+        ]
         raise kind(join_with_semicolons(texts))
+    # Points without observations need finite coordinates only.
     middle = np.nanmean(xyz_m, axis=0) if known.any() else np.zeros(3)
     return np.where(np.isnan(xyz_m), middle, xyz_m)
 
 
-def unfixed_point_error(survey, found, point, centre_m):
-    """The SolutionError of a point that its ties to known ones do not fix, or None.
+def unfixed_point_error(survey, sought, point, centre_m):
+    """SolutionError of a point that its observations to known points do not determine, or None.
 
-    found  network.positioning.Sought        centre_m  (3,) added to its coordinates
+    Parameters
+    ----------
+    survey : network.Survey
+    found : Sought
+    point : int
+    centre_m : ndarray, shape (3,)
+        Added to the coordinates.
     """
     name = survey.points[point]
-    if not found.unknowns:
+    if not sought.unknowns:
         return None
-    if found.rows < found.unknowns:
+    if sought.rows < sought.unknowns:
         return SolutionError(
             message(
                 "point_short_of_readings",
                 "point {name} has {rows} reading to known points, and {unknowns} are needed"
-                if found.rows == 1
+                if sought.rows == 1
                 else "point {name} has {rows} readings to known points, and {unknowns} are needed",
                 name=name,
-                rows=found.rows,
-                unknowns=found.unknowns,
+                rows=sought.rows,
+                unknowns=sought.unknowns,
             )
         )
-    if len(found.rivals_m) > SHOWN or len(found.rivals_m) == 1:
+    if len(sought.rivals_m) > SHOWN or len(sought.rivals_m) == 1:
         return SolutionError(
             message(
                 "point_moves_freely",
@@ -101,7 +132,7 @@ def unfixed_point_error(survey, found, point, centre_m):
                 name=name,
             )
         )
-    if not len(found.rivals_m):
+    if not len(sought.rivals_m):
         return SolutionError(
             message(
                 "point_fits_nowhere",
@@ -111,7 +142,7 @@ def unfixed_point_error(survey, found, point, centre_m):
         )
     places = [
         "(" + ", ".join(f"{value:.2f}" for value in place[np.isfinite(place)]) + ")"
-        for place in found.rivals_m + centre_m
+        for place in sought.rivals_m + centre_m
     ]
     return SeveralPlacesError(
         message(
@@ -125,7 +156,7 @@ def unfixed_point_error(survey, found, point, centre_m):
 
 
 def loose_frame_sentence(survey, local, known):
-    """A sentence about points (points,) of a local frame in plan that joins no known ones."""
+    """Sentence about points (points,) of a local frame in plan that is not joined."""
     names = [str(survey.points[i]) for i in np.flatnonzero(local & ~known)]
     some = list_some(names, LISTED)
     common = int((local & known).sum())
@@ -153,7 +184,7 @@ def loose_frame_sentence(survey, local, known):
 
 
 def join_with_semicolons(parts):
-    """Parts in a row, a semicolon between them."""
+    """Join parts with semicolons."""
     *first, last = parts
     if not first:
         return last
@@ -162,10 +193,13 @@ def join_with_semicolons(parts):
 
 
 def _no_heights(survey, level):
+    """Sentence about points without heights, with the reason and a remedy."""
     names = list_some([str(survey.points[i]) for i in level], LISTED)
     kinds = (HeightDifferences, VerticalAngles)
-    observed = any(isinstance(one, kinds) and len(one) for one in survey.observations)
-    spatial = any(isinstance(one, Distances) and not one.horizontal for one in survey.observations)
+    observed = any(isinstance(item, kinds) and len(item) for item in survey.observations)
+    spatial = any(
+        isinstance(item, Distances) and not item.horizontal for item in survey.observations
+    )
     why = message(
         "no_height_observed",
         "no zenith angle, vertical angle or levelled height difference was observed",
