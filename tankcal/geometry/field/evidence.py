@@ -122,46 +122,44 @@ def _common_values(sites, nominal_m):
     common = [(i, COMPONENTS[i]) for i in _component_indices(sites)[0]]
     waves, heights = wave_columns(sites.azimuth_rad), sites.heights
     welds = np.zeros((len(sites), 1))
-    for members, has_azimuth in zip(sites.members, sites.welds_at(nominal_m), strict=True):
-        welds[members, 0] = has_azimuth.sum(axis=1)
+    for members, selected in zip(sites.members, sites.welds_at(nominal_m), strict=True):
+        welds[members, 0] = selected.sum(axis=1)
     values = {
-        row: welds if component.shape == "weld" else component.columns(waves, heights)
-        for row, (_, component) in enumerate(common)
-        if component.shape in ("mean", "settled", "weld")
+        row: welds if item.shape == "weld" else item.columns(waves, heights)
+        for row, (_, item) in enumerate(common)
+        if item.shape in ("mean", "settled", "weld")
     }
-    has_azimuth = np.isfinite(sites.azimuth_rad)
-    place, azimuths = _group_azimuths(sites.azimuth_rad[has_azimuth], NEAR_M / nominal_m)
-    differences = np.angle(np.exp(1j * (sites.azimuth_rad[has_azimuth] - azimuths[place])))
+    selected = np.isfinite(sites.azimuth_rad)
+    place, azimuths = _group_azimuths(sites.azimuth_rad[selected], NEAR_M / nominal_m)
+    differences = np.angle(np.exp(1j * (sites.azimuth_rad[selected] - azimuths[place])))
     largest = np.abs(differences).max(initial=0.0)
     missed = []
     # Values at distinct azimuths are exact; modes are an approximation for many azimuths.
     if len(azimuths) <= MOST_FOLLOWED and largest <= NEAR_M / nominal_m:
         by_azimuth = np.zeros((len(sites), len(azimuths)))
-        by_azimuth[has_azimuth, place] = 1.0
+        by_azimuth[selected, place] = 1.0
         correlations = azimuth_correlations(azimuths, azimuths, nominal_m)
     else:
         modes = np.arange(2.0, MOST_FOLLOWED // 2 + 2)
         first = multiples(sites.azimuth_rad, int(modes[-1]))
-        by_azimuth = np.nan_to_num(np.hstack([component[:, 1:] for component in first]))
+        by_azimuth = np.nan_to_num(np.hstack([item[:, 1:] for item in first]))
         correlations = {
             shape: np.diag(np.tile(share, 2))
             for shape, share in mode_shares(modes, nominal_m).items()
         }
-        missed = [i for i, component in common if component.shape == "seam"]
+        missed = [i for i, item in common if item.shape == "seam"]
     columns = np.hstack([by_azimuth, *values.values()])
     if sites.shared is not None:
         scale = np.abs(sites.shared).max(axis=0)  # 0: no remaining reading has this unknown
         columns = np.hstack([columns, sites.shared / np.where(scale > 0, scale, 1.0)])
     spread, begin = np.zeros((len(common), columns.shape[1], columns.shape[1])), by_azimuth.shape[1]
-    for row, (_, component) in enumerate(common):
+    for row, (_, item) in enumerate(common):
         if row in values:
             width = values[row].shape[1]
             spread[row, begin : begin + width, begin : begin + width] = np.eye(width)
             begin += width
         else:
-            spread[row, : by_azimuth.shape[1], : by_azimuth.shape[1]] = correlations[
-                component.shape
-            ]
+            spread[row, : by_azimuth.shape[1], : by_azimuth.shape[1]] = correlations[item.shape]
     return columns, spread, missed
 
 
