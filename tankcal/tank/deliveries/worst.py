@@ -229,7 +229,10 @@ def _branch_and_bound(search, best, dips):
 
 
 def _rows_for_use(table):
-    """Return rows outside the critical zone, and the first row of each piece."""
+    """Return rows outside the critical zone, and the first row of each piece.
+
+    The limits of the zone are rows.
+    """
     rows = Rows(table.height_m, table.volume_m3, table.factor_m3, Groups(table.sources))
     critical = table.critical_m
     if critical is None or critical[1] - critical[0] <= SAME_M or len(table.height_m) < 2:
