@@ -153,7 +153,7 @@ def _find_columns(sites, accepted, nominal_m):
 def _may_stand_off(sites, radius_m, columns):
     """Whether a column departs from the mean of its neighbours by at least half a jump.
 
-    This quick test avoids the estimation for most surveys.
+    This quick test avoids an unnecessary estimation.
     """
     if len(columns) < FEWEST:
         return False
