@@ -42,31 +42,32 @@ def draw_departures(rng, sizes_m2, zeta, welds_rad, nominal_m, spans=None):
     shares = mode_shares(modes_of(nominal_m), nominal_m)
     count, courses = nodes_of(nominal_m), len(welds_rad)
     azimuth = np.arange(count) * FULL_TURN / count
-    peaks = [weld_columns(azimuth, np.array(one, dtype=float), nominal_m).T for one in welds_rad]
+    # Profile of each weld along the azimuth, one row for each weld of a course.
+    peaks = [weld_columns(azimuth, np.array(item, dtype=float), nominal_m).T for item in welds_rad]
     spans = spans_of(np.arange(courses + 1.0)) if spans is None else spans
     heights = [Heights.within(span, zeta) for span in spans]
-    found = np.zeros((courses, len(zeta), count))
-    for one, size in zip(COMPONENTS, sizes_m2, strict=True):
+    departures = np.zeros((courses, len(zeta), count))
+    for item, size in zip(COMPONENTS, sizes_m2, strict=True):
         if not size:
             continue
-        draws = 1 if one.common else courses
-        if one.shape == "weld":  # equal at all heights of a course
-            sizes = [rng.normal(size=1 if one.common else len(columns)) for columns in peaks]
+        draws = 1 if item.common else courses
+        if item.shape == "weld":  # equal at all heights of a course
+            sizes = [rng.normal(size=1 if item.common else len(columns)) for columns in peaks]
             for course, columns in enumerate(peaks):
-                drawn = np.broadcast_to(sizes[0 if one.common else course], len(columns))
-                found[course] += np.sqrt(size) * (drawn @ columns)
+                drawn = np.broadcast_to(sizes[0 if item.common else course], len(columns))
+                departures[course] += np.sqrt(size) * (drawn @ columns)
             continue
-        if one.shape == "settled":  # depends on the height above the foot of the shell
-            up = np.sqrt(size) * np.array([one.height_columns(each) for each in heights])
+        if item.shape == "settled":  # depends on the height above the foot of the shell
+            up = np.sqrt(size) * np.array([item.height_columns(each) for each in heights])
         else:
-            up = np.sqrt(size) * _factor_covariance(one.height_covariance(heights[0], heights[0]))
+            up = np.sqrt(size) * _factor_covariance(item.height_covariance(heights[0], heights[0]))
         # A field is the product of its root over the height and a random function of azimuth.
-        if one.shape == "mean":
+        if item.shape == "mean":
             around = rng.normal(size=(draws, up.shape[-1], 1))
         else:
-            around = draw_waves(rng, shares[one.shape], (draws, up.shape[-1]))
-        found += up @ around
-    return found
+            around = draw_waves(rng, shares[item.shape], (draws, up.shape[-1]))
+        departures += up @ around
+    return departures
 
 
 def _factor_covariance(covariance):

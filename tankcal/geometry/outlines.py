@@ -227,6 +227,7 @@ def radii_by_coordinates(outline, xy_m):
         Derivative of each radius by its point; other points have no effect.
     """
     azimuth, radius = polar(xy_m, outline.x_m, outline.y_m)
+    # Slope r'/r of the outline: the tangential shift of a point changes r at a fixed azimuth.
     slope = outline.radius_m(azimuth, derivative=1) / radius
     sin, cos = np.sin(azimuth), np.cos(azimuth)
     return np.column_stack([sin - slope * cos, cos + slope * sin])

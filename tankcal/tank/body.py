@@ -321,6 +321,7 @@ class Body:
         if not np.any(excess):
             return volume
         top = np.array([self.highest_m])
+        # Above the top: a prism over the area at the top.
         return volume + excess * sum(part.area_m2(top) for part in self.parts)
 
     def area_m2(self, levels_m):
@@ -417,4 +418,5 @@ def _changes_volume(by):
     Heights of several courses do, even if the derivatives vanish in a nominal tank of equal
     courses, since the courses of a real tank differ.
     """
+    # Derivatives by several course heights may vanish for equal courses, see above.
     return (by.ndim == 2 and by.shape[1] > 1) or bool(np.any(by != 0))

@@ -93,6 +93,8 @@ class ShapedBottom(Part):
 
     def _of_tip(self, levels, beyond):
         """Return the contribution of the head at levels, from its content beyond a plane."""
+        # Bulging down: content beyond the level. Bulging up: minus the volume that the head
+        # occupies.
         if self.centre_m <= 0:
             return beyond(np.clip(-levels, 0, self.tip.depth_m))
         return beyond(np.clip(levels, 0, self.tip.depth_m)) - beyond(0.0)
@@ -218,6 +220,7 @@ class SurfaceBottom(Part):
         """
         levels = as_levels(levels_m)
         volume, wet = self.surface.volume_and_area(levels)
+        # The plan area grows with the square of the scale; the heights are constant.
         by_scale = 2 * (volume - self._plan_m2 * np.maximum(levels, 0))
         if self.survey is None:
             by_scale += volume - levels * wet  # minus the integral of z over the wet plan

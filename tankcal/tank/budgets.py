@@ -186,6 +186,7 @@ def budget(table, high_m, low_m=None, reading=(), factors=None):
     sources += [_scale_reading(source, table, dips) for source in reading]
     if factors is not None:
         sources = _scale_lines(sources, factors)
+        # The changed u of the lines also changes the standard uncertainty of the table.
         table_u_m3 = float(combine(sources[: len(table.sources)], 1).u[0])
     total = Shares(sources, table.probability)
     return Budget(

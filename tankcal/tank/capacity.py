@@ -176,6 +176,7 @@ class Capacity:
 
     def _combined(self, terms):
         """Return the `Quantity` of a sum of (height, sign) terms."""
+        # A linear combination of rows: the covariance of the rows includes common errors exactly.
         weights = sum(sign * self.weights([height])[0] for height, sign in terms)
         combined = combine([source.weighted(weights[None, :]) for source in self.sources], 1)
         u, dof = float(combined.u[0]), float(combined.effective_dof[0])
@@ -191,6 +192,7 @@ class Capacity:
         """
         dips = np.atleast_1d(np.asarray(heights_m, dtype=float))
         first, last = self.height_m[0], self.height_m[-1]
+        # The negated form also refuses nan.
         outside = ~((dips >= first - SAME_M) & (dips <= max(round(last, 3), last + SAME_M)))
         if np.any(outside):
             raise HeightError(
@@ -211,6 +213,7 @@ class Capacity:
         counts as the top. Raises HeightError outside the table.
         """
         dips = self.inside(heights_m)
+        # Linear interpolation in the interval below the row, as in a gauge.
         upper = np.clip(np.searchsorted(self.height_m, dips), 1, len(self.height_m) - 1)
         below, above = self.height_m[upper - 1], self.height_m[upper]
         part = (dips - below) / (above - below)

@@ -54,6 +54,7 @@ class CourseShape:
     @cached_property
     def girths_m(self):
         """Derivative (LEVELS,) of -A_i by the inset."""
+        # A = 1/2 integral of (s (r - inset))^2: the derivative is -s times the girth.
         return FULL_TURN * self.scale * np.mean(self.outlines_m, axis=1)
 
     @property

@@ -76,6 +76,7 @@ class Ellipsoid(Solid):
         """Return the derivative (rows, 3) of the volume at a fixed dip by a, b and c, m2."""
         d, c = levels_inside(levels_m, self.top_m), self.c_m
         volume = self.volume_m3(d)
+        # Derivative of (3 c - d) / c^2 by c, at a fixed dip d.
         by_c = np.pi * self.a_m * self.b_m * d**2 * (2 * d / (3 * c) - 1) / c**2
         return np.column_stack([volume / self.a_m, volume / self.b_m, by_c])
 
@@ -232,6 +233,7 @@ class PressedSphere(Solid):
     def volume_m3(self, levels_m):
         """Return the volume (rows,) below each dip."""
         wider, dips = self._unloaded(levels_m)
+        # Similar spheres: lengths times t give volumes times t^3 at dips divided by t.
         return wider**3 * self.solid.volume_m3(dips)
 
     def area_m2(self, levels_m):

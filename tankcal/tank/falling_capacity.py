@@ -28,6 +28,7 @@ def refuse_falling(job, body, zero_m, heights_m, volumes_m3):
     SolutionError
         If the volume of the wall itself falls.
     """
+    # Report the largest fall; rounding of large volumes is no fall.
     rise = np.diff(volumes_m3)
     falls = np.flatnonzero(rise < -ROUNDING * np.abs(volumes_m3).max())
     if len(falls) == 0:
@@ -61,6 +62,7 @@ def _find_cause(job, body, dips_m, zero_m):
     for part in body.parts:
         low, high = part.volume_m3(dips_m + zero_m)
         gains.append((float(high - low), part.kind))
+    # The part with the most negative change of volume is the likely cause.
     _, kind = min(gains)
     if kind == "deadwood":
         low, high = dips_m

@@ -53,6 +53,7 @@ class Deadwood(Part):
     def area_m2(self, levels_m):
         """Return the derivative (rows,) of `volume_m3` by the level, upwards at a bottom or top."""
         levels = as_levels(levels_m)
+        # Items without height are jumps of the volume: they do not contribute to the area.
         tall = self.tops_m > self.bottoms_m
         bottom, top = self.bottoms_m[tall], self.tops_m[tall]
         is_within = (levels >= bottom[:, None]) & (levels < top[:, None])
@@ -89,6 +90,7 @@ class Deadwood(Part):
         above = as_levels(levels_m) - self.bottoms_m[:, None]
         heights = (self.tops_m - self.bottoms_m)[:, None]
         step = heights == 0
+        # Heights of zero are replaced before the division, which numpy evaluates for all items.
         linear = np.clip(above / np.where(step, 1.0, heights), 0.0, 1.0)
         return np.where(step, above >= 0, linear).T
 
@@ -229,6 +231,7 @@ class FloatingRoof(Part):
 
     def _per_kg(self, density):
         """Return the displaced volume per kg of the weighed mass."""
+        # Without air buoyancy the formula reduces to M / rho.
         air = AIR_KG_M3 if self.weighing == "air" else 0.0
         if not np.all(np.asarray(density) > AIR_KG_M3):
             raise SolutionError(f"liquid of {density} kg/m3; expected it denser than air")
@@ -289,5 +292,6 @@ def floating_roof(mass_kg, critical_bottom_m, critical_top_m, reference_density_
         float(reference_density_kg_m3),
         weighing,
     )
+    # Evaluate once, to refuse an impossible density here.
     roof.displacement_m3()
     return roof

@@ -75,6 +75,7 @@ class GaugeTube:
     @property
     def full_m(self):
         """Dip of the full section; above the wall, the tube continues in its nozzle."""
+        # Solve depth(d) = 2 R for the dip d.
         rise = self.offset_m * np.sin(self.angle_rad)
         return self.foot_m + (self.radius_m + rise) / np.cos(self.angle_rad)
 
@@ -94,6 +95,7 @@ class GaugeTube:
         """
         sin, cos = np.sin(self.angle_rad), np.cos(self.angle_rad)
         return {
+            # w = sqrt(R^2 - e^2) has the derivatives R / w by the radius and -e / w by the offset.
             "radius": 1 - self.radius_m / self.foot_m * cos,
             "tube_angle": -(dips_m - self.foot_m) * sin - self.offset_m * cos,
             "tube_offset": self.offset_m / self.foot_m * cos - sin,

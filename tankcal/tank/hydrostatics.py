@@ -168,6 +168,7 @@ class LiquidHead(Part):
         The contribution is quadratic in the level, so three levels determine it.
         """
         levels = self.volume.height_m * np.arange(3.0)
+        # Coefficients of the parabola through three levels.
         to_powers = np.linalg.inv(np.vander(levels, increasing=True).T)
         full = [
             _integrate_load(self, h, levels, np.full(3, h.course.top_m)) @ to_powers
@@ -329,6 +330,7 @@ def _integrate_load(head, hoop, levels, ends):
         head.survey_density_kg_m3,
         head.survey_level_m,
     )
+    # Integrals of girth, girth z, 1, z and z^2: all terms of u and u^2 are combinations of these.
     girth, lever, length, first, second = _integrals(hoop.course, hoop.girth_m, ends)
     below = np.zeros((5, len(ends)))  # integrals up to the lower of end and h_s
     if survey_level > hoop.course.bottom_m:
@@ -373,6 +375,7 @@ def _integrals(course, girth_m, ends):
 
     An end below the bottom of the course counts as the bottom.
     """
+    # Gauss-Legendre rule with four nodes on the interval from the bottom to each end.
     half = np.maximum(ends - course.bottom_m, 0.0) / 2
     z = course.bottom_m + half * (1 + NODES[:, None])
     girth = _girth_m(course, girth_m, z)

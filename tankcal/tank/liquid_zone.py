@@ -72,6 +72,7 @@ class MeasuredBottom(Part):
         """
         levels = self._measured(levels_m)
         errors = [np.interp(levels, self.levels_m, column) for column in self.errors_m3.T]
+        # Distance of the curve from straight lines between the measured volumes.
         bend = self.curve(levels) - np.interp(levels, self.levels_m, self.volumes_m3)
         return (
             Source("bottom_liquid", np.column_stack(errors), type="B"),
@@ -204,6 +205,7 @@ class Above(Part):
     def volume_m3(self, levels_m):
         """Return the contribution (rows,) above the level."""
         volume = self.part.volume_m3(self._and_own(levels_m))
+        # The last element is the volume at `level_m`, appended by `_and_own`.
         return volume[:-1] - volume[-1]
 
     def area_m2(self, levels_m):
@@ -233,6 +235,7 @@ class Above(Part):
         """Return the volume of the part, less that at `level_m`, which moves with the zero."""
         if self.moves_with_zero:
             return self.volume_m3(levels_m)
+        # The lower limit moves with the zero as well, so both ends are moved.
         upper = np.maximum(levels_m, self.level_m)
         lower = np.full(len(levels_m), self.level_m)
         above, below = (

@@ -70,6 +70,7 @@ class LyingSolid(Solid):
 
     def area_m2(self, levels_m):
         """Return the derivative (rows,) of the volume by the dip; plumb: the free surface."""
+        # Chain rule: dip to depth, depth to the height in the round tank, height to volume.
         return self._squeeze * self._depth_slope * self._sum(levels_m, Cut.chord)
 
     def depth_m(self, levels_m):
@@ -108,6 +109,7 @@ class LyingSolid(Solid):
     def _liquid_m(self, levels_m, s):
         """Return the height (rows,) of the liquid above the axis at s, in the round tank."""
         levels = levels_inside(levels_m, self._highest_m)
+        # The surface is level, so relative to the tilted axis it falls by the tilt per metre.
         above_dip_zero = self.depth_m(levels) - self.tilt * (s - self.dip_from_a_m)
         return self._squeeze * above_dip_zero - self._radius_m
 
@@ -172,6 +174,7 @@ def check_dip(dip_from_a_m, dip_direction, shift_m, length_m):
     if dip_direction == "plumb":
         high += shift_m
     slack = ROUNDING * length_m
+    # The tolerance permits a dip exactly at an end of the cylinder.
     if min(low, high) < -slack or max(low, high) > length_m + slack:
         raise SolutionError(
             message(

@@ -92,8 +92,10 @@ class Part(Protocol):
 
         Volumes are never below empty; above the top, the part continues with the area at the top.
         """
+        # The volume belongs to the dip, not to the level in the tank.
         if self.moves_with_zero:
             return self.volume_m3(levels_m)
+        # A higher zero adds step_m to the level of each dip.
         moved = levels_m + step_m
         volume = self.volume_m3(np.clip(moved, lowest_m, highest_m))
         excess = np.maximum(moved - highest_m, 0.0)

@@ -159,6 +159,7 @@ class RingedTank(LyingSolid):
         by_ring = np.zeros((2, len(surface), rings))  # surface, and by the radius
         for piece, values in integrals:
             by_ring[:, :, piece.ring] += values[[1, 3]]
+        # The waves exist only in the cylinder, not in the ends.
         waves = np.stack([values[8:].T for piece, values in integrals if not piece.end], axis=1)
         is_dip_ring = np.eye(rings)[self.zero_ring]
         zero = -surface[:, None] * is_dip_ring  # of what moves the bottom of the dip's ring
@@ -218,6 +219,7 @@ class RingedTank(LyingSolid):
     @property
     def _radius_at_top_m(self):
         """Radius of the ring whose top the line of the dip meets."""
+        # A plumb line in a tilted tank is farther from A at the top than at the bottom.
         shift = 2 * self._radius_m * self.tilt if self.dip_direction == "plumb" else 0.0
         return self.radii_m[self._ring_at(self.dip_from_a_m + shift)]
 
@@ -229,6 +231,7 @@ class RingedTank(LyingSolid):
         """
         depths = [depth_of(*item) for item in self._ends]
         low, high = -depths[0] - self.dip_from_a_m, self.length_m + depths[1] - self.dip_from_a_m
+        # Highest point of the inside above the axis at the dip: a full tank reaches it.
         highest_point = max(self.radii_m) + abs(self.tilt) * max(-low, high)
         return max(self.top_m, (highest_point + self._radius_m) / self._stretch)
 

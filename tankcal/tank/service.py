@@ -76,6 +76,7 @@ def shell_factor(shell_c, base_c=BASE_C, expansion_per_k=MILD_STEEL_PER_K):
     >>> round(shell_factor(34.0), 6)
     1.000424
     """
+    # Areas of the horizontal cut grow with the square of lengths, (1 + a dT)^2.
     stretch = expansion_per_k * (shell_c - base_c)
     return 1 + 2 * stretch + stretch**2
 

@@ -234,6 +234,7 @@ class LyingTank(LyingSolid):
     @cached_property
     def _half_height_m(self):
         """Half height B of the rolled section: B^2 = (w/2)^2 sin^2 roll + (h/2)^2 cos^2 roll."""
+        # Support function of the ellipse in the vertical direction.
         sin, cos = np.sin(self.roll_rad), np.cos(self.roll_rad)
         return np.hypot(self.width_m * sin, self.height_m * cos) / 2
 
@@ -246,6 +247,7 @@ class LyingTank(LyingSolid):
     def _by_diameter(self):
         """Derivatives of the radius of the round tank and of the squeeze by width and height."""
         sin2, cos2 = np.sin(self.roll_rad) ** 2, np.cos(self.roll_rad) ** 2
+        # Derivative of sqrt(w h) / 2 for equal changes of w and h.
         radius = (self.width_m + self.height_m) / (8 * self._radius_m)
         half = (self.width_m * sin2 + self.height_m * cos2) / (4 * self._half_height_m)
         return radius, (radius - self._squeeze * half) / self._half_height_m

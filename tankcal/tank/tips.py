@@ -83,15 +83,18 @@ class Tip:
         """
         s, h, plan = self.depth_m - x_m, self.depth_m, self.plan_m2
         if self.form == "cone":
+            # At a fixed x, s = h - x grows with h: both terms of the derivative appear.
             by_depth = plan * (s**2 / h**2 - 2 * s**3 / (3 * h**3))
             return {"scale": 2 * self.beyond_m3(x_m), "depth": by_depth}
         if self.form == "dish":
             sphere = self._sphere_m
+            # The radius of the sphere, (R^2 / h + h) / 2, changes by 1 - sphere / h.
             by_depth = np.pi * s * (2 * sphere - s) + np.pi * s**2 * (1 - sphere / h)
             return {"scale": plan / h * s**2, "depth": by_depth}
         if self.form == "ellipsoidal":
             by_depth = plan * s * (2 / h - s / h**2 - s / h**2 + 2 * s**2 / (3 * h**3))
             return {"scale": 2 * self.beyond_m3(x_m), "depth": by_depth}
+        # The arcs are differentiated by the radius; the scale multiplies the radius.
         names = {"radius": "scale", "end_depth": "depth"} | dict(zip(RADII, RADII, strict=True))
         available = {name for arc in self._arcs for name in arc.by_input}
         derivatives = {
@@ -132,6 +135,7 @@ class Tip:
         """Return the area of the cut at each x, of the knuckle or of the dish."""
         areas = [np.pi * arc.at(_parameter(arc, x_m))[1] ** 2 for arc in self._arcs]
         joint = self._arcs[0].at(self._arcs[0].stop)[0]
+        # The knuckle extends from the edge to the joint, the dish from there to the tip.
         return np.where(x_m < joint, *areas)
 
 

@@ -65,6 +65,7 @@ class ShellVolume:
     def top_weights(self):
         """Derivative (f,) of the area at the top by the features."""
         weights = np.zeros(len(self.features))
+        # At t = 1 all powers are one: the weight of a level is the sum of its coefficients.
         weights[-LEVELS:] = _height_polynomials().sum(axis=0)
         return weights
 
@@ -174,6 +175,7 @@ class ShellVolume:
         area below it. The outlines stay at their surveyed heights.
         """
         joints_below = np.searchsorted(self.joints_m, self._inside(heights_m))
+        # A course raises all joints above it that are below the height.
         steps = np.concatenate([[0.0], np.cumsum(self.joint_steps_m2)])
         return np.take(np.tril(steps[:, None] - steps).T, joints_below, axis=1).T
 

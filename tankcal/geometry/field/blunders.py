@@ -204,9 +204,9 @@ def snoop_wall(precision, pull, accepted, may_go=True, most_sd_m=np.inf, barred=
     Tested
     """
 
-    def tests(found):
-        statistic = np.abs(found.w) * may_go * (found.sd_m < most_sd_m)
-        return found.accepted, np.where(barred, np.nan, statistic), CRITICAL
+    def tests(result):
+        statistic = np.abs(result.w) * may_go * (result.sd_m < most_sd_m)
+        return result.accepted, np.where(barred, np.nan, statistic), CRITICAL
 
     def repeat(before, goes, comes):
         return against_others(precision, pull, before.accepted & ~goes | comes)

@@ -81,7 +81,7 @@ class Covariances:
         everywhere = slice(None)
         # First the common components, over all sites; then the own components, in the blocks of
         # courses.
-        found = self._seams(everywhere) * self._up(True, variances_m2, everywhere)
+        covariance = self._seams(everywhere) * self._up(True, variances_m2, everywhere)
         common = [i for i in self._columns if COMPONENTS[i].common]
         columns = [np.sqrt(variances_m2[i]) * self._columns[i] for i in common]
         if self.sites.welds_rad:
@@ -89,7 +89,7 @@ class Covariances:
                 np.sqrt(variances_m2[i]) * peaks_of_component
                 for i, peaks_of_component in self.peaks.items()
             ]
-        _add_products(found, np.hstack(columns))
+        _add_products(covariance, np.hstack(columns))
         for members in self.runs:
             block = self._seams(members) * self._up(False, variances_m2, members)
             own_columns = [
@@ -99,8 +99,8 @@ class Covariances:
             ]
             _add_products(block, np.hstack(own_columns))
             both = (members, members) if isinstance(members, slice) else np.ix_(members, members)
-            found[both] += block
-        return found
+            covariance[both] += block
+        return covariance
 
     def spread(self, weights, index):
         """Return the covariance (f, f) of functionals (f, n) of the sites due to a component."""

@@ -84,6 +84,7 @@ class MeanFunctionals:
 
     def __init__(self, field, totals):
         self._field, self._totals = field, totals
+        # A functional depends on the mean radius of its own course only.
         by_course = np.eye(len(totals))[:, None] * totals[:, :, None]
         self.weights = by_course.reshape(-1, len(totals))
 

@@ -120,6 +120,7 @@ class Sites:
         The order is: radius, then for each ring x and y of its centre, and of its lean.
         """
         azimuth, ring = self.azimuth_rad[members], self.ring[members]
+        # The mean of a full turn (nan) does not depend on the centre of the section.
         turn = np.nan_to_num(np.column_stack([np.sin(azimuth), np.cos(azimuth)]))
         columns = [np.ones((len(members), 1))]
         for number in np.unique(ring[ring >= 0]):
@@ -155,6 +156,7 @@ def free_design(sites):
     starts = np.cumsum([0, *(block.shape[1] for _, block in blocks)])
     design = np.zeros((len(sites), starts[-1]))
     for start, (members, block) in zip(starts, blocks, strict=False):
+        # The parameters of a course affect only its own readings: the design is block diagonal.
         design[members, start : start + block.shape[1]] = block
     if sites.shared is not None:
         design = np.hstack([design, sites.shared])

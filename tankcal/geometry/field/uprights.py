@@ -129,6 +129,8 @@ def _jump(precision, pull, column):
     weight, column_pull = precision[np.ix_(column, column)], pull[column]
     total = max(weight.sum(), 1e-300)
     size = column_pull.sum() / total
+    # Jump of each reading without the others; readings with a small part of the jump do not share
+    # it.
     each = scipy.linalg.pinvh(weight, rtol=NOTHING_LEFT) @ column_pull
     return _Jump(size, size * np.sqrt(total), column[each * np.sign(size) > PART * abs(size)])
 
@@ -138,6 +140,7 @@ def _find_columns(sites, accepted, nominal_m):
     accepted_indices = np.flatnonzero(accepted)
     turn = sites.azimuth_rad[accepted_indices] % FULL_TURN
     order = np.argsort(turn)
+    # Divide the turn at gaps wider than LINK_M; the division starts at a gap, not within a column.
     gap = np.diff(turn[order], prepend=turn[order[-1]] - FULL_TURN) * nominal_m
     starts = np.flatnonzero(gap > LINK_M)
     if not len(starts):

@@ -86,6 +86,7 @@ def deliveries_between(rows, probability, low, high, for_use):
 
 def ratio_of(U, volume):
     """Return U over volume; inf if U is above 0 and the volume is not."""
+    # Replace zero volumes before the division, which numpy evaluates for all elements.
     safe = np.where(volume > 0, volume, 1.0)
     return np.where(volume > 0, U / safe, np.where(U > 0, np.inf, 0.0))
 
@@ -114,6 +115,7 @@ class Groups:
         u = np.sqrt(squares.sum(axis=-1))
         if not len(self.dof):
             return u, np.zeros_like(u)
+        # Only sources with finite degrees of freedom contribute to w.
         by_source = squares[..., self.columns] @ self.members
         return u, sum_of_fourths(by_source, self.dof) ** 0.25
 

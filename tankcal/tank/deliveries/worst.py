@@ -240,6 +240,7 @@ def _rows_for_use(table):
     heights = table.height_m
     ends = np.array(critical, dtype=float)
     inside = (ends > heights[0]) & (ends < heights[-1])
+    # The limits of the critical zone become rows, so that each piece ends exactly there.
     new = [end for end in ends[inside] if np.abs(heights - end).min() > SAME_M]
     heights = np.sort(np.append(heights, new))
     low, high = ends
@@ -253,6 +254,7 @@ def _rows_for_use(table):
 def _best_at_minimum(search):
     """Return (size, dips) of the worst delivery of the minimum height with a dip at a row."""
     rows, minimum_m = search.rows, search.minimum_m
+    # Each row once as the lower dip, and once as the upper dip.
     low = np.concatenate([rows.height_m, rows.height_m - minimum_m])
     high = np.concatenate([rows.height_m + minimum_m, rows.height_m])
     keep = (low >= rows.height_m[0] - SAME_M) & (high <= rows.height_m[-1] + SAME_M)

@@ -143,6 +143,7 @@ class _Marks:
         first = int(np.ceil(bottom_m / self.mark_m - _SAME))
         last = int(np.floor(top_m / self.mark_m + _SAME))
         number = np.arange(first, last + 1)
+        # Rounding must not place the first or last mark outside the zone.
         marks = np.clip(multiples_of(self.mark_m, first, last), bottom_m, top_m)
         rows = multiples_of(self.row_step_m, 0, last // self.parts)[number // self.parts]
         between = number % self.parts != 0
@@ -157,5 +158,6 @@ class _Marks:
             deviation_m3=0.0 if worst is None else float(deviation[worst]),
             at_m=float(bottom_m if worst is None else marks[worst]),
         )
+        # Every mark must be within the bound at its own dip.
         good = self.bound_m3 is None or bool(np.all(np.abs(deviation) <= self.bound_m3(marks)))
         return zone, good

@@ -90,6 +90,7 @@ def top_mark(top_m, height_unit="m", *, closed=False):
     """
     step = float(HEIGHT_STEPS_M[height_unit])
     if height_unit == "m" and closed:
+        # Round up, except for an excess below a micrometre.
         number = np.ceil(top_m / step - _LAST_STEP_M / step)
     else:
         number = np.round(top_m / step)
@@ -102,6 +103,7 @@ def multiples_of(step_m, first, last):
     """Return first * step, ..., last * step, each rounded once from the exact product."""
     numbers = np.arange(first, last + 1, dtype=float)
     step = step_m * _PER_METRE
+    # Steps of whole nanometres give exact products; rows of other steps are rounded.
     if abs(step - round(step)) < 1e-3:
         return numbers * round(step) / _PER_METRE  # exact integer product, a single rounding
     return np.round(numbers * step_m, 9)
@@ -127,11 +129,11 @@ def _check_steps(step_m, top_m, fine_step_m, fine_zones):
     if fine_zones:
         ratio = step_m / (fine_step_m or np.inf)
         if not ratio > 1.5 or abs(ratio - round(ratio)) > 1e-6:
-            found = "no fine step" if fine_step_m is None else f"{fine_step_m:g} m"
+            given_step = "no fine step" if fine_step_m is None else f"{fine_step_m:g} m"
             raise InputError(
                 Problem(
                     "table",
-                    f"{found}; expected a whole part of the step of {step_m:g} m",
+                    f"{given_step}; expected a whole part of the step of {step_m:g} m",
                     None,
                     "fine_step_m",
                 )

@@ -117,6 +117,7 @@ def dip_label(height_m, height_unit="m"):
         whole, part = divmod(inches, 1)
         fraction = f" {part.numerator}/{part.denominator}" if part else ""
         return f"{feet}' {whole}{fraction}\""
+    # Between marks: round once to thousandths of an inch, so that 12 inches become a foot.
     thousandths = round(height_m / float(METRES_PER_INCH) * 1000)
     feet, inches = divmod(Fraction(thousandths, 1000), INCHES_PER_FOOT)
     return f"{feet}' {float(inches):.3f}\""
@@ -182,6 +183,7 @@ def _inches(match):
         return None
     fraction = Fraction(0)
     if numerator is not None:
+        # Only binary fractions below one inch are marks of a tape.
         if int(denominator) not in (2, 4, 8, 16, 32, 64) or int(numerator) >= int(denominator):
             return None
         if "." in (inches or ""):

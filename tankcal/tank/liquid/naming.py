@@ -75,12 +75,12 @@ class Verdict:
     undetected_U: float | None = None
 
 
-def name_causes(found, alternatives):
+def name_causes(adjusted, alternatives):
     """Return the `Verdict`s of all alternatives, the most likely first.
 
     Parameters
     ----------
-    found : LiquidAdjustment
+    adjusted : LiquidAdjustment
     alternatives : sequence of Alternative
 
     Returns
@@ -90,7 +90,7 @@ def name_causes(found, alternatives):
     if not alternatives:
         return ()
     columns = np.stack([alternative.column for alternative in alternatives], axis=1)
-    size, sd, w = found.test(columns)
+    size, sd, w = adjusted.test(columns)
     for place, alternative in enumerate(alternatives):
         if alternative.is_whole and np.isfinite(sd[place]):
             # Reduction of chi-square for the fixed size one: (size^2 - (size - 1)^2) / sd^2.

@@ -144,6 +144,7 @@ def _merge_vertices(vertices, faces):
     """Merge equal vertices, remove unused vertices and degenerate faces; return also notes."""
     corners = vertices[faces.ravel()] + 0.0  # negative zeros become positive zeros
     order = np.lexsort(corners.T)
+    # In lexicographic order, equal vertices are neighbours.
     new = np.append(True, np.any(np.diff(corners[order], axis=0) != 0, axis=1))
     index = np.empty(len(order), dtype=np.int64)
     index[order] = new.cumsum() - 1
@@ -168,6 +169,7 @@ def _refuse_open(vertices, faces, name):
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     # A single integer identifies an edge regardless of its direction.
     key = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
+    # In a closed mesh, faces use each edge an even number of times, equally in both directions.
     keys, edge, uses = np.unique(key, return_inverse=True, return_counts=True)
     balance = np.bincount(edge, weights=np.sign(end - start))
     for is_open, wrong in ((True, uses % 2 == 1), (False, balance != 0)):
@@ -392,6 +394,7 @@ def _refuse_negative(mesh, name):
     area = part.area_m2(heights[sample])
     worst = int(np.argmin(area))
     if area[worst] < -1e-9 * area.max():
+        # Heights of the part count from the lowest vertex.
         z = heights[sample][worst] + mesh.vertices_m[:, 2].min()
         raise problem(
             name,

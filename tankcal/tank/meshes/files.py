@@ -40,6 +40,7 @@ def _join_lines(lines):
 def _clean_off(lines):
     """Return rows without comments and blanks, with the first word of the file in capitals."""
     rows = [row for row in (line.partition("#")[0].strip() for line in lines) if row]
+    # The strict reader accepts the keyword OFF only in capitals.
     if rows and not rows[0][:1].isdigit():
         word, space, rest = rows[0].partition(" ")
         rows[0] = word.upper() + space + rest
@@ -67,6 +68,7 @@ def _clean_ply(data):
         return data
     header = _filter_ply_rows(_split_lines(start[: header_end.end()]))
     body = start[header_end.end() :]
+    # The body of a binary file must remain unchanged.
     if any(row.startswith("format ascii") for row in header):
         body = _join_lines(_filter_ply_rows(_split_lines(body)))
     return _join_lines(header) + body
@@ -155,5 +157,6 @@ def write_mesh(mesh, path, origin_m=(0.0, 0.0, 0.0)):
     """
     import trimesh
 
+    # A nearby origin preserves the precision of single-precision formats.
     vertices = mesh.vertices_m - np.asarray(origin_m, dtype=float)
     trimesh.Trimesh(vertices, mesh.faces, process=False).export(Path(path))

@@ -110,6 +110,7 @@ def _lofted_faces(vertices, count):
     """Return faces (m, 3) of `vertices` in rings of `count`, then the centres of bottom and lid."""
     index = np.arange(count)
     next_index = np.roll(index, -1)
+    # Index offsets of the rings: each strip connects a ring with the next.
     strips = np.arange(0, vertices - count, count)[:, None, None]
     side = np.concatenate(
         [

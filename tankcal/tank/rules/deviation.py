@@ -148,14 +148,14 @@ def judge_deviation(limit, table, stated, printed=None):
     return judge_volume(limit, stated, quantity, U)
 
 
-def judge_volume(limit, stated, found, U):
+def judge_volume(limit, stated, quantity, U):
     """Return the DeviationVerdict of a limit and a StatedVolume for a volume.
 
     Parameters
     ----------
     limit : DeviationLimit
     stated : StatedVolume
-    found : Quantity
+    quantity : Quantity
         Volume for comparison, see `tankcal.tank.capacity`.
     U : float
         Printed expanded uncertainty, m3.
@@ -164,27 +164,29 @@ def judge_volume(limit, stated, found, U):
     -------
     DeviationVerdict
     """
-    u = found.u_m3 * U / found.U_m3 if found.U_m3 else 0.0
+    # The printed U may be that of Monte Carlo: u grows in proportion.
+    u = quantity.u_m3 * U / quantity.U_m3 if quantity.U_m3 else 0.0
     tolerance = limit.limit * abs(stated.volume_m3) if limit.limit_m3 is None else limit.limit_m3
+    # A one-sided limit has an infinite tolerance on the other side.
     lower = -math.inf if limit.side == "upper" else stated.volume_m3 - tolerance
     upper = math.inf if limit.side == "lower" else stated.volume_m3 + tolerance
     guard = U if limit.guard == "U" else 0.0
-    code = _code(found, lower, upper, guard)
+    code = _code(quantity, lower, upper, guard)
     return DeviationVerdict(
         limit=limit,
         stated=stated,
         code=code,
         passed=None if code == "not_for_use" else code == "conforms",
-        volume_m3=found.value_m3,
+        volume_m3=quantity.value_m3,
         u_m3=u,
         U_m3=U,
-        k=found.k,
-        dof=found.dof,
-        deviation_m3=found.value_m3 - stated.volume_m3,
+        k=quantity.k,
+        dof=quantity.dof,
+        deviation_m3=quantity.value_m3 - stated.volume_m3,
         tolerance_m3=(lower, upper),
         accepted_m3=(lower + guard, upper - guard),
         guard_m3=guard,
-        probability=float(conformity_probability(found.value_m3, u, lower, upper, found.dof)),
+        probability=float(conformity_probability(quantity.value_m3, u, lower, upper, quantity.dof)),
     )
 
 

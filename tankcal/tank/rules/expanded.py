@@ -133,8 +133,10 @@ def _judge_rows(limit, table, printed, rows, capacity):
     volume, U = table.volume_m3[rows], printed[rows]
     base = volume if limit.relative_to == "itself" else np.full(len(rows), capacity)
     ratio = ratio_of(U, base)
+    # A product instead of a quotient: an empty tank has no ratio.
     is_met = limit.limit * base * (1 + _ROUNDING) >= U
     exceeded = np.flatnonzero(~is_met)
+    # The limit is met from the row after the last row that exceeds it.
     first = exceeded[-1] + 1 if len(exceeded) else 0
     code = "holds" if not len(exceeded) else "holds_from" if first < len(rows) else "fails"
     worst = int(np.argmax(ratio))
@@ -196,6 +198,7 @@ def _judge_deliveries(limit, table, capacity, printed):
         for delivery in judged
         if _height(delivery) > max(exceeded_heights) + _SAME_M
     ]
+    # A simulated delivery exceeds the limit above that height: use simulated heights only.
     if from_m is not None and max(exceeded_heights) > from_m - _SAME_M:
         from_m = float(np.ceil(1000 * min(met_heights) - 1e-6) / 1000) if met_heights else None
     code = "fails" if from_m is None else "holds_from"

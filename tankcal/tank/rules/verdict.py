@@ -75,6 +75,7 @@ def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
     if tank not in TANKS:
         raise ValueError(f"kind of tank {tank!r}: expected one of {', '.join(TANKS)}")
     printed = printed or printed_of_table(table)
+    # The capacity is the volume of the highest row for use.
     rows = np.flatnonzero(table.for_use(table.height_m))
     capacity = float(table.volume_m3[rows[-1]]) if len(rows) else np.nan
     is_too_large = rule.largest_capacity_m3 is not None and capacity > rule.largest_capacity_m3
@@ -86,6 +87,7 @@ def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
     verdicts = (*uncertainty, *deviation)
     applied = [verdict.limit for verdict in verdicts]
     judged = [v.limit for v in verdicts if v.code not in ("nothing_to_judge", "not_for_use")]
+    # A limit without any verdict must be visible to the user.
     unjudged = tuple(item.name for item in (*limits, *others) if item not in judged)
     return RuleVerdict(
         rule=rule,

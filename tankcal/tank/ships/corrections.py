@@ -137,6 +137,7 @@ def soundings_of_volumes(part, volumes_m3):
             )
         )
     grid = np.linspace(0.0, part.top_m, GRID)
+    # Rounding may make the volumes fall slightly; the bracket requires ascending values.
     volumes_on_grid = np.maximum.accumulate(part.volume_m3(grid))
     upper = np.clip(np.searchsorted(volumes_on_grid, volumes), 1, GRID - 1)
     low, high = grid[upper - 1].copy(), grid[upper].copy()

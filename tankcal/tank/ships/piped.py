@@ -228,6 +228,7 @@ def piped_mesh(mesh, pipe, trim=0.0, list_=0.0, *, scale=1.0, contracted=None, m
     >>> tank.volume_m3([1.04]).round(9).tolist()
     [8.0]
     """
+    # The lower end of the pipe becomes the origin, so that level 0 is the zero of the soundings.
     local = scale * (mesh.vertices_m - pipe.bottom_m)
     sheared = local.copy()
     sheared[:, 2] += local[:, :2] @ (trim, list_)
