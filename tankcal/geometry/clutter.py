@@ -88,18 +88,18 @@ def find_form(local, course, zeta, candidates, axis, relative, slope_sd, least_m
     thin = _sample_points(xyz, courses, axis)
     part = xyz[thin], courses[thin], Uneven(uneven.columns[thin], uneven.sd_m)
 
-    def fit_accepted(accepted, before):
+    def fitted(accepted, before):
         return _fit_form(*part, axis, relative[thin], slope_sd, accepted, before)
 
     def refit(before, goes, comes):
-        return fit_accepted(before.accepted & ~goes | comes, before)
+        return fitted(before.accepted & ~goes | comes, before)
 
     def tests(fit, stays=stays[thin]):
         far = (np.abs(fit.residual) > least_m) & ~stays
         return fit.accepted, np.where(far, np.abs(fit.w), 0.0), CRITICAL
 
     # The first fit accepts all points; `snoop` then alternates rejections and fits.
-    fit = fit_accepted(np.ones(len(thin), dtype=bool), None)
+    fit = fitted(np.ones(len(thin), dtype=bool), None)
     if least_m is not None:
         fit = snoop(fit, tests, refit, at_once=0.9, returns=1).adjustment
     # The sample determined the form; now predict and test the remaining points once.

@@ -463,7 +463,7 @@ def hull_perimeter(places):
 
     Examples
     --------
-    >>> hull_perimeter(np.array([3, 1 + 1j, 4j, -3, -4j]))  # 1 + 1j stands within
+    >>> hull_perimeter(np.array([3, 1 + 1j, 4j, -3, -4j]))  # 1 + 1j is inside
     20.0
     """
     while True:

@@ -348,15 +348,15 @@ def descend_distances(distances, unknowns, points, steps=100):
     latest = {}
 
     # `least_squares` requests value and Jacobian separately: both come from one evaluation.
-    def evaluate(x):
+    def at(x):
         if latest.get("x") != x.tobytes():
             latest.update(x=x.tobytes(), found=distances(x, points))
         return latest["found"]
 
     found = scipy.optimize.least_squares(
-        lambda x: evaluate(x)[0],
+        lambda x: at(x)[0],
         unknowns,
-        lambda x: evaluate(x)[1],
+        lambda x: at(x)[1],
         method="lm",
         x_scale="jac",
         xtol=1e-10,

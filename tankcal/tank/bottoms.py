@@ -137,7 +137,7 @@ def shaped_bottom(form, plan_m2, centre_m=0.0, dish_radius_m=None, knuckle_radiu
 
     Examples
     --------
-    A cone of 0.3 m below a floor of 100 m2 holds a third of its prism:
+    A cone of 0.3 m below an area of 100 m2 contains a third of its prism:
 
     >>> round(float(shaped_bottom("cone", 100.0, -0.3).volume_m3([0.0])[0]), 9)
     10.0

@@ -208,11 +208,11 @@ def snoop_wall(precision, pull, accepted, may_go=True, most_sd_m=np.inf, barred=
         statistic = np.abs(result.w) * may_go * (result.sd_m < most_sd_m)
         return result.accepted, np.where(barred, np.nan, statistic), CRITICAL
 
-    def repeat(before, goes, comes):
+    def again(before, goes, comes):
         return against_others(precision, pull, before.accepted & ~goes | comes)
 
     start = against_others(precision, pull, accepted)
-    return snoop(start, tests, repeat, at_once=AT_ONCE, returns=1).adjustment
+    return snoop(start, tests, again, at_once=AT_ONCE, returns=1).adjustment
 
 
 def carried_over(precision, aside):

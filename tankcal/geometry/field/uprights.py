@@ -64,13 +64,13 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure, scatter
         return marked
     piece, centred = Piece(sites, np.arange(len(sites)), nominal_m), radius_m - radius_m.mean()
 
-    def eliminate(sizes):
+    def without(sizes):
         noise = sizes[-1] * variance_m2 + LEAST_NOISE_M**2
         precision = piece.precision(sizes[:-1], noise)[0][:, :]  # most of its columns are required
         return _eliminated(precision, precision @ centred, np.flatnonzero(~tested.accepted))
 
     sizes, least = tested.sizes_m2, max(LEAST_M, LEAST_W * scatter_m)
-    reduced = eliminate(sizes)
+    reduced = without(sizes)
     jumps = [_jump(*reduced, item) for item in all_columns if not sure[item].any()]
     distant = [item for item in jumps if abs(item.size_m) > least and _is_tall(sites, item.members)]
     # The largest jumps first; the remaining columns must suffice to estimate the amplitudes.
@@ -83,7 +83,7 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure, scatter
         kept[np.concatenate(columns)] = False
         kept_readings = radius_m[kept], variance_m2[kept]
         sizes = likely_variances(sites.take(kept), *kept_readings, nominal_m, sizes)
-        count, columns = len(columns), _select_unlikely(*eliminate(sizes), columns, least)
+        count, columns = len(columns), _select_unlikely(*without(sizes), columns, least)
         if len(columns) == count:
             break
     for item in columns:

@@ -218,7 +218,7 @@ def piped_mesh(mesh, pipe, trim=0.0, list_=0.0, *, scale=1.0, contracted=None, m
 
     Examples
     --------
-    A box of 4 x 2 x 3 m whose pipe stands in its starboard corner aft, 2 cm of trim in each metre:
+    A box of 4 x 2 x 3 m with its pipe in the starboard corner aft, and a trim of 2 cm per metre:
 
     >>> from tankcal.tank.meshes import closed_mesh
     >>> import trimesh
