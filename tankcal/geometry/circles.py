@@ -116,12 +116,19 @@ def _fit_distances(local, covariance_m2, start):
     """
     unknowns = start
     for _ in range(MOST_ROUNDS):
-        before, spread = unknowns, radial_covariance(local, unknowns[:2], covariance_m2)
-        variances = np.diag(spread) if np.ndim(spread) == 1 else spread
+        previous, distance_covariance = (
+            unknowns,
+            radial_covariance(local, unknowns[:2], covariance_m2),
+        )
+        variances = (
+            np.diag(distance_covariance)
+            if np.ndim(distance_covariance) == 1
+            else distance_covariance
+        )
         # A damped step reduces the sum of squares even where the full step of `adjust` does not.
         lower = scipy.linalg.cholesky(variances, lower=True)
-        unknowns = _damped_circle(local, lower, before)
-        if np.allclose(unknowns, before, rtol=0, atol=SETTLED_M):
+        unknowns = _damped_circle(local, lower, previous)
+        if np.allclose(unknowns, previous, rtol=0, atol=SETTLED_M):
             break
     # Linearise once more at the solution: L^-1 v and L^-1 A give chi2 and the cofactor (A' Q^-1
     # A)^-1.

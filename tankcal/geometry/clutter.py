@@ -88,15 +88,15 @@ def find_form(local, course, zeta, candidates, axis, relative, slope_sd, least_m
     thin = _sample_points(xyz, courses, axis)
     part = xyz[thin], courses[thin], Uneven(uneven.columns[thin], uneven.sd_m)
 
-    def fitted(accepted, before):
-        return _fit_form(*part, axis, relative[thin], slope_sd, accepted, before)
+    def fitted(accepted, previous_fit):
+        return _fit_form(*part, axis, relative[thin], slope_sd, accepted, previous_fit)
 
-    def refit(before, goes, comes):
-        return fitted(before.accepted & ~goes | comes, before)
+    def refit(previous_fit, goes, comes):
+        return fitted(previous_fit.accepted & ~goes | comes, previous_fit)
 
     def tests(fit, stays=stays[thin]):
-        far = (np.abs(fit.residual) > least_m) & ~stays
-        return fit.accepted, np.where(far, np.abs(fit.w), 0.0), CRITICAL
+        is_far = (np.abs(fit.residual) > least_m) & ~stays
+        return fit.accepted, np.where(is_far, np.abs(fit.w), 0.0), CRITICAL
 
     # The first fit accepts all points; `snoop` then alternates rejections and fits.
     fit = fitted(np.ones(len(thin), dtype=bool), None)
@@ -106,9 +106,9 @@ def find_form(local, course, zeta, candidates, axis, relative, slope_sd, least_m
     everywhere = _predict_all(fit, thin, xyz, courses, uneven, relative)
     if least_m is not None:
         _, statistic, critical = tests(everywhere, stays)
-        rest = np.ones(len(index), dtype=bool)
-        rest[thin] = False
-        everywhere.accepted[rest] = statistic[rest] <= critical
+        outside_sample = np.ones(len(index), dtype=bool)
+        outside_sample[thin] = False
+        everywhere.accepted[outside_sample] = statistic[outside_sample] <= critical
     return _build_wall(everywhere, index, thin, len(local))
 
 
@@ -163,7 +163,7 @@ class _FormFit:
         return self.accepted, np.abs(self.w), CRITICAL
 
 
-def _fit_form(xyz, course, uneven, axis, relative, slope_sd, accepted, before):
+def _fit_form(xyz, course, uneven, axis, relative, slope_sd, accepted, previous_fit):
     """Fit a shell with form, with point noise and form amplitude as two variance components.
 
     Helmert's simple iteration: each standard deviation is scaled by the square root of the sum of
@@ -172,11 +172,11 @@ def _fit_form(xyz, course, uneven, axis, relative, slope_sd, accepted, before):
     two standard deviations have less weight (Huber 1964), so that clutter does not distort the
     form.
     """
-    noise, form = (before.noise, before.form) if before else (0.005, 0.010)
-    residual = before.residual if before else np.zeros(len(xyz))
-    axis = before.fit.unknowns[:4] if before else axis
+    noise, form = (previous_fit.noise, previous_fit.form) if previous_fit else (0.005, 0.010)
+    residual = previous_fit.residual if previous_fit else np.zeros(len(xyz))
+    axis = previous_fit.fit.unknowns[:4] if previous_fit else axis
     n = len(xyz)
-    for _ in range(3 if before else 10):
+    for _ in range(3 if previous_fit else 10):
         previous = noise, form
         # Huber weights: beyond two standard deviations, the standard deviation grows with the
         # residual.
@@ -328,8 +328,8 @@ def _covers_turn(azimuth):
     """Whether azimuths (k,) cover the circumference without a wide gap."""
     if len(azimuth) < FEWEST_OF_RING:
         return False
-    around = np.sort(azimuth)
-    return np.diff(around, append=around[0] + 2 * np.pi).max() < WIDEST_GAP
+    sorted_azimuths = np.sort(azimuth)
+    return np.diff(sorted_azimuths, append=sorted_azimuths[0] + 2 * np.pi).max() < WIDEST_GAP
 
 
 def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
@@ -386,10 +386,10 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
 
     def model(x, observations):
         offset = _offsets(xyz, x[:4])
-        distance, along = _perpendicular_distance(offset, start_slope)
+        distance, foot_heights = _perpendicular_distance(offset, start_slope)
         # The derivative of the slope is that of x and y times the height.
         by_xy = (
-            -(offset - np.outer(along, start_slope)) / distance[:, None]
+            -(offset - np.outer(foot_heights, start_slope)) / distance[:, None]
         )  # d(distance) / d(offset)
         by_axis = np.hstack([by_xy, by_xy * xyz[:, 2:]])
         by_unknowns = np.hstack([by_axis, by_radius, -by_form, -by_uneven])

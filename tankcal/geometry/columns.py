@@ -105,15 +105,17 @@ def _count_contradictions(place_m, depth, column, accepted, noise_m):
     # Beyond this distance along the arc, even the steepest plate has returned to the wall.
     reach = depth[column].max() / STEEPEST
     lowest, highest = place_m[column].min(axis=0), place_m[column].max(axis=0)
-    near = accepted & (arc > lowest[0] - reach) & (arc < highest[0] + reach)
-    near = np.flatnonzero(near & (height >= lowest[1]) & (height <= highest[1]))
-    if not len(near):
+    neighbours = accepted & (arc > lowest[0] - reach) & (arc < highest[0] + reach)
+    neighbours = np.flatnonzero(neighbours & (height >= lowest[1]) & (height <= highest[1]))
+    if not len(neighbours):
         return 0
     # The slope of a plate concerns the distance along the arc: heights have little weight.
     scale = np.array([1.0, reach / LINK_M[1]])
-    nearest = scipy.spatial.cKDTree(place_m[column] * scale).query(place_m[near] * scale)[1]
+    nearest = scipy.spatial.cKDTree(place_m[column] * scale).query(place_m[neighbours] * scale)[1]
     partner = column[nearest]
     # Least depth of the wall at a neighbour: the plate descends from the column at the steepest
     # slope.
-    least_depth = depth[partner] - STEEPEST * np.abs(arc[near] - arc[partner]) - SIGMA * noise_m
-    return np.count_nonzero(depth[near] < least_depth)
+    least_depth = (
+        depth[partner] - STEEPEST * np.abs(arc[neighbours] - arc[partner]) - SIGMA * noise_m
+    )
+    return np.count_nonzero(depth[neighbours] < least_depth)

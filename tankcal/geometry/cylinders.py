@@ -157,12 +157,12 @@ def cylinder_distances(frame):
         norm = np.hypot(1.0, np.hypot(*slopes))
         axis = np.array([*slopes, 1.0]) / norm
         d = points @ frame.T - (x, y, 0.0)
-        along = d @ axis
+        axial = d @ axis
         # Subtract the component along the axis: the rest is perpendicular to it.
-        distance, normal = unit_vectors(d - along[:, None] * axis)
+        distance, normal = unit_vectors(d - axial[:, None] * axis)
         by_point = -normal[:, :2]
         # A small rotation moves the axis by the height of the foot above the reference plane.
-        by_slopes = by_point * (along / norm)[:, None]
+        by_slopes = by_point * (axial / norm)[:, None]
         by_unknowns = np.column_stack([by_point, by_slopes, -np.ones(len(d))])
         return distance - radius, by_unknowns, normal @ frame
 
@@ -201,14 +201,14 @@ def lying_cylinder(xyz_m, covariance_m2, azimuth_rad):
     (1.99995, 0.01)
     """
     cylinder = fit_cylinder(xyz_m, covariance_m2)
-    east, north, up = cylinder.direction
+    east, north, rise = cylinder.direction
     level = np.hypot(east, north)
-    if abs(up) > level:
+    if abs(rise) > level:
         raise SolutionError(
             message(
                 "cylinder_stands",
                 "the cylinder stands: its axis leans {lean_deg:.1f} deg",
-                lean_deg=np.degrees(np.arctan2(level, abs(up))),
+                lean_deg=np.degrees(np.arctan2(level, abs(rise))),
             )
         )
     # The fitted direction has no sense: choose the sign that points from A to B.
@@ -226,13 +226,13 @@ def lying_cylinder(xyz_m, covariance_m2, azimuth_rad):
         )
     # tilt = up / level: derivative of a quotient, for rotations towards each tangent.
     level_change = cylinder.tangents @ np.array([east, north, 0.0]) / level
-    by_direction = sign * (cylinder.tangents[:, 2] * level - up * level_change) / level**2
+    by_direction = sign * (cylinder.tangents[:, 2] * level - rise * level_change) / level**2
     transform = np.zeros((2, 5))
     transform[0, 4] = 2.0
     transform[1, 2:4] = by_direction
     return LyingCylinder(
         diameter_m=2 * cylinder.radius_m,
-        tilt=float(sign * up / level),
+        tilt=float(sign * rise / level),
         azimuth_rad=float(azimuth),
         cofactor=transform @ cylinder.cofactor @ transform.T,
         cylinder=cylinder,
@@ -288,12 +288,12 @@ def _find_start(local):
     )
     errors, centres, radii = _fit_algebraic(sample, frames)
     errors[:3] = -1.0  # the principal directions of the points are always tried
-    best, tried = None, []
+    best, tried_indices = None, []
     for i in np.argsort(errors, kind="stable"):
-        if any(abs(frames[i][2] @ frames[j][2]) > np.cos(LEAST_ANGLE) for j in tried):
+        if any(abs(frames[i][2] @ frames[j][2]) > np.cos(LEAST_ANGLE) for j in tried_indices):
             continue
         # Skip directions close to a direction already tried: they lead to the same minimum.
-        tried.append(i)
+        tried_indices.append(i)
         distances = cylinder_distances(frames[i])
         unknowns = descend_distances(
             distances, [*centres[i], 0.0, 0.0, radii[i]], sample, FIRST_STEPS
@@ -301,14 +301,14 @@ def _find_start(local):
         cost = np.sum(distances(unknowns, sample)[0] ** 2)
         if np.isfinite(cost) and unknowns[4] > 0 and (best is None or cost < best[0]):
             best = cost, *_align_frame(frames[i], unknowns)
-        if len(tried) == CANDIDATES:
+        if len(tried_indices) == CANDIDATES:
             break
     if best is None:
         raise SolutionError(
             message(
                 "cylinder_not_found",
                 "no cylinder was found from {count} starting directions",
-                count=len(tried),
+                count=len(tried_indices),
             )
         )
     _, frame, unknowns = best
@@ -346,15 +346,15 @@ def _sample_half_sphere(count):
     """Return (count, 3) evenly spread directions of a half sphere (Fibonacci lattice)."""
     i = np.arange(count) + 0.5
     z, angle = i / count, i * np.pi * (1 + 5**0.5)
-    across = np.sqrt(1 - z**2)
-    return np.column_stack([across * np.cos(angle), across * np.sin(angle), z])
+    horizontal = np.sqrt(1 - z**2)
+    return np.column_stack([horizontal * np.cos(angle), horizontal * np.sin(angle), z])
 
 
 def _build_frames(directions):
     """Return (n, 3, 3) right-handed frames with the given third rows."""
-    least = np.argmin(np.abs(directions), axis=1)
+    smallest_axis = np.argmin(np.abs(directions), axis=1)
     # The coordinate axis farthest from the direction gives a well-conditioned cross product.
-    first = np.cross(np.eye(3)[least], directions)
+    first = np.cross(np.eye(3)[smallest_axis], directions)
     first = first / np.linalg.norm(first, axis=1)[:, None]
     return np.stack([first, np.cross(directions, first), directions], axis=1)
 

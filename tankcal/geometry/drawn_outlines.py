@@ -54,19 +54,23 @@ def draw_departures(rng, sizes_m2, zeta, welds_rad, nominal_m, spans=None):
         if item.shape == "weld":  # equal at all heights of a course
             sizes = [rng.normal(size=1 if item.common else len(columns)) for columns in peaks]
             for course, columns in enumerate(peaks):
-                drawn = np.broadcast_to(sizes[0 if item.common else course], len(columns))
-                departures[course] += np.sqrt(size) * (drawn @ columns)
+                peak_sizes = np.broadcast_to(sizes[0 if item.common else course], len(columns))
+                departures[course] += np.sqrt(size) * (peak_sizes @ columns)
             continue
         if item.shape == "settled":  # depends on the height above the foot of the shell
-            up = np.sqrt(size) * np.array([item.height_columns(each) for each in heights])
+            over_height = np.sqrt(size) * np.array(
+                [item.height_columns(course_heights) for course_heights in heights]
+            )
         else:
-            up = np.sqrt(size) * _factor_covariance(item.height_covariance(heights[0], heights[0]))
+            over_height = np.sqrt(size) * _factor_covariance(
+                item.height_covariance(heights[0], heights[0])
+            )
         # A field is the product of its root over the height and a random function of azimuth.
         if item.shape == "mean":
-            around = rng.normal(size=(draws, up.shape[-1], 1))
+            around_turn = rng.normal(size=(draws, over_height.shape[-1], 1))
         else:
-            around = draw_waves(rng, shares[item.shape], (draws, up.shape[-1]))
-        departures += up @ around
+            around_turn = draw_waves(rng, shares[item.shape], (draws, over_height.shape[-1]))
+        departures += over_height @ around_turn
     return departures
 
 

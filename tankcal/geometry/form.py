@@ -92,13 +92,13 @@ def multiples(azimuth_rad, highest):
     """
     powers = np.empty((highest, len(azimuth_rad)), dtype=complex)
     powers[:1] = np.exp(1j * np.asarray(azimuth_rad, dtype=float))
-    known = 1
+    count = 1
     # Doubling: exp(i (j + known) a) = exp(i j a) exp(i known a), so rounding grows as
     # log2(highest).
-    while known < highest:
-        added = min(known, highest - known)
-        np.multiply(powers[:added], powers[known - 1], out=powers[known : known + added])
-        known += added
+    while count < highest:
+        added = min(count, highest - count)
+        np.multiply(powers[:added], powers[count - 1], out=powers[count : count + added])
+        count += added
     return powers.real.T, powers.imag.T
 
 

@@ -418,8 +418,8 @@ def draw_waves(rng, variances_m2, draws=()):
     modes = len(variances_m2)
     count = NODES_OF_WAVE * (modes + 2)
     waves = np.zeros((*draws, count // 2 + 1), dtype=complex)
-    drawn = rng.normal(size=(2, *draws, modes))
-    waves[..., 2 : modes + 2] = np.sqrt(variances_m2) * (drawn[0] - 1j * drawn[1])
+    normals = rng.normal(size=(2, *draws, modes))
+    waves[..., 2 : modes + 2] = np.sqrt(variances_m2) * (normals[0] - 1j * normals[1])
     # `irfft` divides by count; a real wave has two conjugate terms.
     return np.fft.irfft(waves, count) * count / 2
 

@@ -96,10 +96,10 @@ def rotation_of_view(azimuth_rad, tilt_rad, roll_rad):
     # Axes of a camera without roll: viewing direction, horizontal to the right, and upwards.
     ahead = np.stack([sa * cv, ca * cv, sv + zero], axis=-1)
     level = np.stack([ca + zero, -sa + zero, zero], axis=-1)
-    above = np.stack([-sa * sv, -ca * sv, cv + zero], axis=-1)
+    upward = np.stack([-sa * sv, -ca * sv, cv + zero], axis=-1)
     # The rows of R are the axes of the camera in the object frame; its z axis points backwards.
     ck, sk = (ck + zero)[..., None], (sk + zero)[..., None]
-    return np.stack([level * ck + above * sk, -level * sk + above * ck, -ahead], axis=-2)
+    return np.stack([level * ck + upward * sk, -level * sk + upward * ck, -ahead], axis=-2)
 
 
 def view_of_rotation(rotation):

@@ -188,14 +188,14 @@ def find_shell(
     # Only the ratios of the standard deviations enter; the noise level is estimated.
     relative = believed / np.median(believed)
     zeta = _relative_heights(xyz_m[:, 2], course, np.asarray(joints_m, dtype=float))
-    least = BELIEVED_M if snooping else None
+    least_departure = BELIEVED_M if snooping else None
     band = (local, course, zeta, wall)
-    found = find_form(*band, axis, relative, WIDEST_SLOPE, least, kept)
+    found = find_form(*band, axis, relative, WIDEST_SLOPE, least_departure, kept)
     tilt_known = np.sqrt(np.diag(found.slope_cofactor).max()) < VAGUE_TILT
     # Too uncertain a tilt: repeat the fit with an upright axis, held by a tight prior.
     if not tilt_known:
         upright = np.array([*axis[:2], 0.0, 0.0])
-        found = find_form(*band, upright, relative, 1e-9, least, kept)
+        found = find_form(*band, upright, relative, 1e-9, least_departure, kept)
     in_band, axis, column = wall, found.axis, np.full(len(xyz_m), NONE)
     w, residual, wall, sizes = found.w, found.residual.copy(), found.wall, None
     if snooping:
@@ -318,11 +318,11 @@ def _mark_seams(local, course, candidates, in_band, form, nominal_radius_m):
     distance, wall = distances_from_axis(local, form.axis)[1], form.wall
     radii = _mean_radii(distance[wall], course[wall], course.max() + 1, nominal_radius_m)
     departure = np.where(in_band, form.residual, distance - radii[course])
-    near = np.flatnonzero(candidates & (np.abs(departure) < NEAR_M))
+    nearby = np.flatnonzero(candidates & (np.abs(departure) < NEAR_M))
     in_seam = np.zeros(len(local), dtype=bool)
-    for place in _unroll(local[near], form.axis, nominal_radius_m):
-        for band in (near >= 0, *np.equal.outer(np.unique(course[near]), course[near])):
-            members = near[band]
+    for place in _unroll(local[nearby], form.axis, nominal_radius_m):
+        for band in (nearby >= 0, *np.equal.outer(np.unique(course[nearby]), course[nearby])):
+            members = nearby[band]
             rejected = ~form.wall[members] & ~in_seam[members]
             in_seam[members] |= find_seams(place[band], departure[members], rejected, form.noise)
     return in_seam & in_band
@@ -430,8 +430,8 @@ def _shares_near(xy, circles, band):
         x, y, r = circles[block].T[:, :, None]
         squared = (xy[:, 0] - x) ** 2 + (xy[:, 1] - y) ** 2
         # Compare squares: no square root for each point and circle.
-        near = (squared > np.maximum(r - band, 0) ** 2) & (squared < (r + band) ** 2)
-        shares[block] = np.count_nonzero(near, axis=1)
+        in_band = (squared > np.maximum(r - band, 0) ** 2) & (squared < (r + band) ** 2)
+        shares[block] = np.count_nonzero(in_band, axis=1)
     return shares / max(len(xy), 1)
 
 
@@ -455,11 +455,11 @@ def _fit_leaning_cylinder(local, course, candidates, circle, nominal_radius):
     """
     axis = np.array([circle[0], circle[1], 0.0, 0.0])
     distance = distances_from_axis(local, axis)[1]
-    least = max(WALL_BAND * nominal_radius, LEAST_BAND_M)
-    widest = max(WIDE_BAND * nominal_radius, least)
+    least_band = max(WALL_BAND * nominal_radius, LEAST_BAND_M)
+    widest = max(WIDE_BAND * nominal_radius, least_band)
     wall = candidates & (np.abs(distance - circle[2]) < widest)
     previous_wall = ~wall
-    for band in np.repeat(np.geomspace(widest, least, 5), 3):
+    for band in np.repeat(np.geomspace(widest, least_band, 5), 3):
         if np.any(previous_wall != wall):  # unchanged points would give an unchanged axis
             rough_sd, previous_wall = np.full(wall.sum(), 0.01), wall
             fit = adjust(

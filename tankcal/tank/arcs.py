@@ -204,8 +204,8 @@ def integrate(arc, level_m, slope, integrands, nodes=NODES):
     level_m, slope = np.asarray(level_m, dtype=float), slope + arc.lift
     row, parameter, weight = _wet_nodes(arc, level_m, slope, nodes)
     x, radius, step = arc.at(parameter)
-    cut = Cut(arc, parameter, x, radius, level_m[row, None] - slope * x)
-    sums = [np.einsum("pn,pn->p", step * weight, integrand(cut)) for integrand in integrands]
+    sections = Cut(arc, parameter, x, radius, level_m[row, None] - slope * x)
+    sums = [np.einsum("pn,pn->p", step * weight, integrand(sections)) for integrand in integrands]
     # Several panels belong to a row: add their sums.
     return np.array(
         [np.bincount(row, sums_of_panels, minlength=len(level_m)) for sums_of_panels in sums]

@@ -362,15 +362,17 @@ class Body:
         """
         levels = np.linspace(self.lowest_m, self.highest_m, LEVELS)
         derivatives = self.derivatives(levels)
-        known = {item.name for item in self.declared}
+        known_names = {item.name for item in self.declared}
         if self.shell is not None:
-            known.update(self.shell.unused)
+            known_names.update(self.shell.unused)
         if any(item.kind == OWN_SCALE for part in self.parts for item in part.sources(levels)):
-            known.add("scale")
+            known_names.add("scale")
         if any(part.has_own_height for part in self.parts):
-            known.add("bottom")
+            known_names.add("bottom")
         return tuple(
-            name for name, by in derivatives.items() if name not in known and _changes_volume(by)
+            name
+            for name, derivative in derivatives.items()
+            if name not in known_names and _changes_volume(derivative)
         )
 
     def sources(self, levels_m):
@@ -385,8 +387,8 @@ class Body:
         """
         derivatives = self.derivatives(levels_m)
         for name in inputs:
-            by = derivatives.get(name, np.zeros(len(levels_m)))
-            derivatives[name] = np.zeros_like(by) if name in without else by
+            derivative = derivatives.get(name, np.zeros(len(levels_m)))
+            derivatives[name] = np.zeros_like(derivative) if name in without else derivative
         return self._sources(self._inside(levels_m), derivatives)
 
     def rows(self, levels_m):
@@ -412,11 +414,11 @@ class Body:
         return (*part_sources, *group_correlated(declared_sources, self.correlations))
 
 
-def _changes_volume(by):
+def _changes_volume(derivatives):
     """Whether an input changes volumes, by its derivatives (rows,) or (rows, courses).
 
     Heights of several courses do, even if the derivatives vanish in a nominal tank of equal
     courses, since the courses of a real tank differ.
     """
     # Derivatives by several course heights may vanish for equal courses, see above.
-    return (by.ndim == 2 and by.shape[1] > 1) or bool(np.any(by != 0))
+    return (derivatives.ndim == 2 and derivatives.shape[1] > 1) or bool(np.any(derivatives != 0))

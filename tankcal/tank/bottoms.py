@@ -91,13 +91,13 @@ class ShapedBottom(Part):
             )
         return derivatives
 
-    def _of_tip(self, levels, beyond):
+    def _of_tip(self, levels, content_beyond):
         """Return the contribution of the head at levels, from its content beyond a plane."""
         # Bulging down: content beyond the level. Bulging up: minus the volume that the head
         # occupies.
         if self.centre_m <= 0:
-            return beyond(np.clip(-levels, 0, self.tip.depth_m))
-        return beyond(np.clip(levels, 0, self.tip.depth_m)) - beyond(0.0)
+            return content_beyond(np.clip(-levels, 0, self.tip.depth_m))
+        return content_beyond(np.clip(levels, 0, self.tip.depth_m)) - content_beyond(0.0)
 
     def _wet_m2(self, levels_m):
         """Return the wet plan area (rows,) of the bottom."""

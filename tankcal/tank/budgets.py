@@ -237,9 +237,9 @@ def _budget_rows(total, index):
 
 def _budget_row(source, shares, correlations=()):
     """Return the `BudgetRow` of a source."""
-    known = source.u is not None
+    has_u = source.u is not None
     column = float(source.columns_m3[0, 0]) if source.columns_m3.shape[1] == 1 else None
-    is_slope = known and source.u > 0 and column is not None
+    is_slope = has_u and source.u > 0 and column is not None
     return BudgetRow(
         name=source.kind,
         unit=source.unit or "",
@@ -249,7 +249,7 @@ def _budget_row(source, shares, correlations=()):
         note=source.note,
         is_default=source.is_default,
         estimate=np.nan if source.estimate is None else source.estimate,
-        u=source.u if known else np.nan,
+        u=source.u if has_u else np.nan,
         sensitivity=column / source.u if is_slope else np.nan,
         correlations=correlations,
         **shares,

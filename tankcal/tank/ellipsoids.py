@@ -256,10 +256,12 @@ class PressedSphere(Solid):
         head = self._compliance * STANDARD_GRAVITY / (4 * self._radius_m)  # strain per kg/m
         # The strain due to gas is proportional to r; the strain due to a head does not depend on r.
         by_radius = self._compliance * self._gas_pa / self._radius_m
-        derivatives = {name: wider**3 * by for name, by in self.solid.derivatives(dips).items()}
+        derivatives = {
+            name: wider**3 * derivative for name, derivative in self.solid.derivatives(dips).items()
+        }
         radius_by = {"diameter": 0.5, "plate_thickness": -1.0, "scale": self._radius_m}
-        for name, by in radius_by.items():
-            derivatives[name] = derivatives[name] + by_strain * by_radius * by
+        for name, derivative in radius_by.items():
+            derivatives[name] = derivatives[name] + by_strain * by_radius * derivative
         derivatives["plate_thickness"] = (
             derivatives["plate_thickness"] - by_strain * strain / self.membrane.thickness_m
         )

@@ -274,14 +274,14 @@ def _torispherical_inputs(end, radius_m, dish, knuckle):
     inner = radius_m - knuckle
     reach = np.sqrt((dish - radius_m) * (dish + radius_m - 2 * knuckle))
     h = dish - reach
-    free = {  # derivatives by R, f and k, with the other two fixed
+    partial_derivatives = {  # derivatives by R, f and k, with the other two fixed
         "radius": np.array([[0.0, 1, 0, 0], [inner / reach, 0, 0, 0]]),
         "dish": np.array([[0.0, 0, 0, 0], [(knuckle - dish) / reach, 0, 1, 1]]),
         "knuckle": np.array([[0.0, -1, 1, 1], [(dish - radius_m) / reach, 0, 0, 0]]),
     }
     if not end.depth_m:
         stretch = np.array([[0.0, 0, knuckle / h, 0], [-reach / h, 0, dish / h, 0]])
-        derivatives, given_names = free | {"end_depth": stretch}, RADII
+        derivatives, given_names = partial_derivatives | {"end_depth": stretch}, RADII
     else:
         by_depth = {  # derivatives of h by R, f and k
             "radius": inner / reach,
@@ -291,11 +291,13 @@ def _torispherical_inputs(end, radius_m, dish, knuckle):
         computed = RADII[end.dish_radius_m is not None]
         slope = by_depth[computed]
         derivatives = {  # the computed radius changes so that the depth is constant
-            name: by - by_depth[name] / slope * free[computed]
-            for name, by in free.items()
+            name: derivative - by_depth[name] / slope * partial_derivatives[computed]
+            for name, derivative in partial_derivatives.items()
             if name != computed
         }
-        derivatives["end_depth"] = free[computed] / slope
+        derivatives["end_depth"] = partial_derivatives[computed] / slope
         given_names = [name for name in derivatives if name != "radius"]
     derivatives["end_plate"] = -sum(derivatives[name] for name in given_names)
-    return tuple({name: by[arc] for name, by in derivatives.items()} for arc in (0, 1))
+    return tuple(
+        {name: derivative[arc] for name, derivative in derivatives.items()} for arc in (0, 1)
+    )

@@ -144,7 +144,7 @@ class LiquidHead(Part):
             )
         place = np.searchsorted([hoop.course.bottom_m for hoop in self.hoops], levels, "right") - 1
         sums = np.zeros((1 + len(INPUTS), len(levels)))
-        for index, (hoop, below) in enumerate(zip(self.hoops, self._below, strict=True)):
+        for index, (hoop, lower_courses) in enumerate(zip(self.hoops, self._below, strict=True)):
             rows = np.flatnonzero(place == index)
             course_levels = levels[rows]
             values = _integrate_load(
@@ -157,7 +157,10 @@ class LiquidHead(Part):
                 (course_levels < shell) | (self.headroom_m == 0)
             )
             # Courses below contribute a quadratic polynomial of the level.
-            values += below[:, :1] + (below[:, 1:2] + below[:, 2:] * course_levels) * course_levels
+            values += (
+                lower_courses[:, :1]
+                + (lower_courses[:, 1:2] + lower_courses[:, 2:] * course_levels) * course_levels
+            )
             sums[:, rows] = values
         return sums
 
@@ -332,11 +335,12 @@ def _integrate_load(head, hoop, levels, ends):
     )
     # Integrals of girth, girth z, 1, z and z^2: all terms of u and u^2 are combinations of these.
     girth, lever, length, first, second = _integrals(hoop.course, hoop.girth_m, ends)
-    below = np.zeros((5, len(ends)))  # integrals up to the lower of end and h_s
+    survey_integrals = np.zeros((5, len(ends)))  # integrals up to the lower of end and h_s
     if survey_level > hoop.course.bottom_m:
-        below = _integrals(hoop.course, hoop.girth_m, np.minimum(ends, survey_level))
+        survey_integrals = _integrals(hoop.course, hoop.girth_m, np.minimum(ends, survey_level))
     depth = [
-        survey_level * below[i] - below[j] for i, j in ((0, 1), (2, 3), (3, 4))
+        survey_level * survey_integrals[i] - survey_integrals[j]
+        for i, j in ((0, 1), (2, 3), (3, 4))
     ]  # of (h_s - z)+
     mass = density * levels
     hoops = mass * girth - density * lever - survey * depth[0]  # integral of girth u
@@ -346,14 +350,16 @@ def _integrate_load(head, hoop, levels, ends):
         mass * depth[1] - density * depth[2] - survey * (survey_level * depth[1] - depth[2]),
     ]
     square = mass * moments[0] - density * moments[1] - survey * moments[2]
-    both = mass * below[2] - density * below[3] - survey * depth[1]
+    survey_moment = mass * survey_integrals[2] - density * survey_integrals[3] - survey * depth[1]
     by_one, by_height, by_depth = (  # derivatives by the coefficients of 1, z, (h_s - z)+ in u
         compliance_k * (linear + 2 * np.pi * compliance_k * moment)
         for linear, moment in zip((girth, lever, depth[0]), moments, strict=True)
     )
-    by_level = compliance_k * (below[0] + 2 * np.pi * compliance_k * both)
+    by_level = compliance_k * (survey_integrals[0] + 2 * np.pi * compliance_k * survey_moment)
     by_compliance = hoops + 2 * np.pi * compliance_k * square
-    derivatives_by = {name: by * by_compliance for name, by in hoop.compliance_by.items()}
+    derivatives_by = {
+        name: derivative * by_compliance for name, derivative in hoop.compliance_by.items()
+    }
     derivatives_by["liquid_density"] = levels * by_one - by_height
     derivatives_by["survey_density"] = derivatives_by["survey_density"] - by_depth
     derivatives_by["survey_level"] = derivatives_by["survey_level"] - survey * by_level
@@ -365,8 +371,8 @@ def _integrate_load(head, hoop, levels, ends):
 
 def _at_surface(head, hoop, levels):
     """Return girth d + pi d^2 (rows,) at each level, where only the unloading acts."""
-    above = np.maximum(head.survey_level_m - levels, 0)
-    widening = -hoop.compliance * head.survey_density_kg_m3 * above
+    survey_depth = np.maximum(head.survey_level_m - levels, 0)
+    widening = -hoop.compliance * head.survey_density_kg_m3 * survey_depth
     return (_girth_m(hoop.course, hoop.girth_m, levels) + np.pi * widening) * widening
 
 

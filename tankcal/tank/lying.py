@@ -136,10 +136,10 @@ def pieces_of_ends(ends, length_m, last_ring=0, upward=1.0):
     upward  as for `heads.meridian`
     """
     places = ("a", 0.0, -1, 0), ("b", length_m, 1, last_ring)
-    for (end, radius), (name, origin, out, ring) in zip(ends, places, strict=True):
+    for (end, radius), (name, origin, outwards, ring) in zip(ends, places, strict=True):
         sign = -1 if end.inward else 1
         for arc in meridian(end, radius, upward):
-            yield Piece(arc, origin, sign * out, sign, name, ring)
+            yield Piece(arc, origin, sign * outwards, sign, name, ring)
 
 
 def refuse_meeting_ends(ends, length_m):

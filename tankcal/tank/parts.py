@@ -96,9 +96,9 @@ class Part(Protocol):
         if self.moves_with_zero:
             return self.volume_m3(levels_m)
         # A higher zero adds step_m to the level of each dip.
-        moved = levels_m + step_m
-        volume = self.volume_m3(np.clip(moved, lowest_m, highest_m))
-        excess = np.maximum(moved - highest_m, 0.0)
+        moved_levels = levels_m + step_m
+        volume = self.volume_m3(np.clip(moved_levels, lowest_m, highest_m))
+        excess = np.maximum(moved_levels - highest_m, 0.0)
         if not np.any(excess):
             return volume
         return volume + excess * self.area_m2(np.array([highest_m]))[0]
@@ -137,6 +137,6 @@ def sum_derivatives(derivatives):
     """
     total = {}
     for part_derivatives in derivatives:
-        for name, by in part_derivatives.items():
-            total[name] = total[name] + by if name in total else by
+        for name, derivative in part_derivatives.items():
+            total[name] = total[name] + derivative if name in total else derivative
     return total

@@ -192,16 +192,16 @@ class RingedTank(LyingSolid):
         surface (rows, rings) includes the ends; of_end_b (rows,) is the surface of end B alone
         """
         rings = surface.shape[1]
-        beyond = np.cumsum(surface[:, ::-1], axis=1)[:, ::-1] - surface  # sum of later rings
-        beyond[:, -1] = of_end_b
+        later_surface = np.cumsum(surface[:, ::-1], axis=1)[:, ::-1] - surface  # sum of later rings
+        later_surface[:, -1] = of_end_b
         sections = [self._section_m2(levels, self.joints_m[i + 1], i) for i in range(rings)]
-        return np.column_stack(sections) - self.tilt * beyond
+        return np.column_stack(sections) - self.tilt * later_surface
 
     @cached_property
     def _pieces(self):
-        by = {"radius": (1.0, 0.0)}
+        by_input = {"radius": (1.0, 0.0)}
         cylinder = (
-            Piece(Line(start, stop, radius, 0.0, by), 0.0, 1, 1, "", ring)
+            Piece(Line(start, stop, radius, 0.0, by_input), 0.0, 1, 1, "", ring)
             for ring, (start, stop, radius) in enumerate(
                 zip(self.joints_m[:-1], self.joints_m[1:], self.radii_m, strict=True)
             )

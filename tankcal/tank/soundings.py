@@ -171,9 +171,9 @@ def _form(footprint, kriging, size, heights, edges):
 def _refuse_outside(footprint, plan):
     """Raise SolutionError for a point outside the wall."""
     azimuth, distance = np.arctan2(*plan.T), np.hypot(*plan.T)
-    beyond = distance / footprint.radius_at(azimuth) - 1
-    worst = int(np.argmax(beyond))
-    if not beyond[worst] <= BEYOND_WALL:
+    excess = distance / footprint.radius_at(azimuth) - 1
+    worst = int(np.argmax(excess))
+    if not excess[worst] <= BEYOND_WALL:
         raise SolutionError(
             message(
                 "bottom_point_off_wall",

@@ -69,14 +69,14 @@ class SurveyedForm:
         factors : tuple of body.Factor
         """
         stretch = 1 + added_height_m / height_m
-        risen = node_levels(height_m) * (stretch - 1)
+        rise_m = node_levels(height_m) * (stretch - 1)
         # The nodes of the wall are higher by `risen`: add the volume between to compare at equal
         # shares.
-        rest = added_m3 + area_m2 * risen
-        share = rest[-1] / volume_m3[-1]
+        additional_m3 = added_m3 + area_m2 * rise_m
+        share = additional_m3[-1] / volume_m3[-1]
         size = volume_m3 * (1 + np.cos(node_turns())) ** 1.5
         bend = np.zeros(NODES)
-        bend[1:-1] = (rest - share * volume_m3)[1:-1] / size[1:-1]
+        bend[1:-1] = (additional_m3 - share * volume_m3)[1:-1] / size[1:-1]
         bend = np.clip(bend, -MOST_BEND, MOST_BEND)
         # g is 0 / 0 at the ends: continue with the neighbouring values.
         bend[0], bend[-1] = bend[1], bend[-2]

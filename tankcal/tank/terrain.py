@@ -120,11 +120,11 @@ class Surface:
         """Return derivatives (rows, v) of `volume_and_area` by lower vertices, m2."""
         levels, count = np.atleast_1d(levels_m), len(self.heights_m)
         rows, faces = np.nonzero(self.heights_m[self.faces[:, 2]] <= levels[:, None])
-        whole = np.broadcast_to(self.areas_m2[faces, None] / 3, (len(faces), 3))
-        cut_rows, cut_faces, cut = self._cut(levels)
+        whole_weights = np.broadcast_to(self.areas_m2[faces, None] / 3, (len(faces), 3))
+        cut_rows, cut_faces, cut_weights = self._cut(levels)
         rows, faces = np.append(rows, cut_rows), np.append(faces, cut_faces)
         place = (rows[:, None] * count + self.faces[faces]).ravel()
-        weights = np.vstack([whole, cut]).ravel()
+        weights = np.vstack([whole_weights, cut_weights]).ravel()
         return np.bincount(place, weights, len(levels) * count).reshape(len(levels), count)
 
     def _cut(self, levels):

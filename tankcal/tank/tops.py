@@ -50,14 +50,14 @@ class HeadedShell(Part):
 
     def volume_m3(self, levels_m):
         """Return the volume (rows,) of shell and head below each level."""
-        below, x = self._split(levels_m)
-        return self.shell.volume_m3(below) + self.tip.beyond_m3(0.0) - self.tip.beyond_m3(x)
+        shell_levels, x = self._split(levels_m)
+        return self.shell.volume_m3(shell_levels) + self.tip.beyond_m3(0.0) - self.tip.beyond_m3(x)
 
     def area_m2(self, levels_m):
         """Return the inside area (rows,) at each level; at the edge, the area of the head."""
-        below, x = self._split(levels_m)
+        shell_levels, x = self._split(levels_m)
         in_head = as_levels(levels_m) >= self.base_m
-        return np.where(in_head, self.tip.area_m2(x), self.shell.area_m2(below))
+        return np.where(in_head, self.tip.area_m2(x), self.shell.area_m2(shell_levels))
 
     def derivatives(self, levels_m):
         """Return {input: (rows,)} of the shell, of the plan of the head, and of its dimensions.
@@ -65,9 +65,9 @@ class HeadedShell(Part):
         "top_depth" raises the tip over its edge. "dish" and "knuckle" are the radii of a
         torispherical head, if given. A higher course raises the whole head.
         """
-        below, x = self._split(levels_m)
-        in_head, cut = as_levels(levels_m) >= self.base_m, self.tip.area_m2(x)
-        derivatives = self.shell.derivatives(below)
+        shell_levels, x = self._split(levels_m)
+        in_head, cut_m2 = as_levels(levels_m) >= self.base_m, self.tip.area_m2(x)
+        derivatives = self.shell.derivatives(shell_levels)
         plan, by_tip = self.tip.plan_m2, self._of_tip(x)
         # The plan grows with the square of its scale.
         by_plan = by_tip.pop("scale") / (2 * plan)
@@ -75,19 +75,24 @@ class HeadedShell(Part):
             if name in derivatives:
                 derivatives[name] = derivatives[name] + by_plan * by_input
         # Raising the head adds a cylinder over the plan, and removes the cut at the level.
-        by_lift = np.where(in_head, plan - cut, 0.0)
+        by_lift = np.where(in_head, plan - cut_m2, 0.0)
         if "datum" in derivatives:
-            derivatives["datum"] = np.where(in_head, cut, derivatives["datum"])
+            derivatives["datum"] = np.where(in_head, cut_m2, derivatives["datum"])
         if "course_heights" in derivatives:
             derivatives["course_heights"] = derivatives["course_heights"] + by_lift[:, None]
         if self.shell.stretch != 1.0:
             # A stretch of heights changes the dimensions of the head, and the level of its edge.
-            by_heights = sum(self.tip.sizes_m[name] * by for name, by in by_tip.items())
+            by_heights = sum(
+                self.tip.sizes_m[name] * derivative for name, derivative in by_tip.items()
+            )
             by_stretch = (by_heights + by_lift * self.base_m) / self.shell.stretch
             for name in MOVED_BY_HEIGHT:
                 if name in derivatives:
                     derivatives[name] = derivatives[name] + self._warmed_by(name) * by_stretch
-        derivatives |= {"top_depth" if name == "depth" else name: by for name, by in by_tip.items()}
+        derivatives |= {
+            "top_depth" if name == "depth" else name: derivative
+            for name, derivative in by_tip.items()
+        }
         return derivatives
 
     def sources(self, levels_m):
@@ -95,12 +100,12 @@ class HeadedShell(Part):
         factors = self.shell.factors
         if not factors:
             return ()
-        below, x = self._split(levels_m)
+        shell_levels, x = self._split(levels_m)
         by_plan = self._of_tip(x)["scale"] / (2 * self.tip.plan_m2)
         weights = self.shell.volume.top_weights
         return tuple(
             factor.source(source.columns_m3 + by_plan[:, None] * (weights @ factor.columns))
-            for factor, source in zip(factors, self.shell.sources(below), strict=True)
+            for factor, source in zip(factors, self.shell.sources(shell_levels), strict=True)
         )
 
     def _split(self, levels_m):
@@ -121,8 +126,8 @@ class HeadedShell(Part):
 
     def _of_tip(self, x):
         """Return {input of the tip: derivative (rows,) of the volume of the head below x}."""
-        complete, beyond = self.tip.derivatives(np.zeros(1)), self.tip.derivatives(x)
-        return {name: complete[name] - beyond[name] for name in complete}
+        complete, remaining = self.tip.derivatives(np.zeros(1)), self.tip.derivatives(x)
+        return {name: complete[name] - remaining[name] for name in complete}
 
     def _plan_by(self):
         """Return {input: derivative of the plan of the head, m2 per SI unit}."""
@@ -130,7 +135,9 @@ class HeadedShell(Part):
         courses = volume.courses
         weights, scale = volume.top_weights, 2 * self.tip.plan_m2 / shell.scale
         girth = float(weights @ volume.girth_features)
-        by_readings = {name: float(weights @ by) for name, by in shell.read_with.items()}
+        by_readings = {
+            name: float(weights @ derivative) for name, derivative in shell.read_with.items()
+        }
         departures = {
             name: sum(
                 float(course_weights @ (course.girths_m * course.missed[name]))
@@ -150,12 +157,12 @@ class HeadedShell(Part):
             **departures,
         }
         derivatives = {
-            name: by
-            for name, by in derivatives.items()
+            name: derivative
+            for name, derivative in derivatives.items()
             if name in ("scale", "offset", "tilt", *shell.bearing, *departures)
         }
-        for name, by in by_readings.items():
-            derivatives[name] = derivatives.get(name, 0.0) + by
+        for name, derivative in by_readings.items():
+            derivatives[name] = derivatives.get(name, 0.0) + derivative
         return derivatives
 
     def _warmed_by(self, name):

@@ -110,9 +110,9 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted, barred=None
             # A reading that the others hardly predict cannot be tested: the limit is relative to
             # its prior sd.
             precision, before_m = piece.precision(variances, piece_noise)
-            pull, most = precision @ centred[chosen], MOST_SD * before_m
+            pull, most_sd = precision @ centred[chosen], MOST_SD * before_m
             tested = snoop_wall(
-                precision, pull, accepted[chosen], may_go[chosen], most, barred[chosen]
+                precision, pull, accepted[chosen], may_go[chosen], most_sd, barred[chosen]
             )
             for name in ("accepted", "departure_m", "w", "sd_m"):
                 getattr(results, name)[chosen] = getattr(tested, name)
@@ -208,8 +208,8 @@ def snoop_wall(precision, pull, accepted, may_go=True, most_sd_m=np.inf, barred=
         statistic = np.abs(result.w) * may_go * (result.sd_m < most_sd_m)
         return result.accepted, np.where(barred, np.nan, statistic), CRITICAL
 
-    def again(before, goes, comes):
-        return against_others(precision, pull, before.accepted & ~goes | comes)
+    def again(previous, goes, comes):
+        return against_others(precision, pull, previous.accepted & ~goes | comes)
 
     start = against_others(precision, pull, accepted)
     return snoop(start, tests, again, at_once=AT_ONCE, returns=1).adjustment

@@ -49,15 +49,15 @@ def cells_of(sites, variance_m2, nominal_m, most=MOST_SITES):
         height = np.clip(((sites.zeta + 1) / height_step).astype(int), 0, rows - 1)
         cell = (ring * rows + height) * columns + (turn / width).astype(int)
         place = np.unique(cell, return_inverse=True)[1]
-        around = width > FULL_TURN
+        full_turn = width > FULL_TURN
         if place.max() < most or (
-            around and height_step > 2
+            full_turn and height_step > 2
         ):  # no further reduction: one cell a ring
             break
         # First widen the cells to a full turn; only then may they exceed the height limit.
         width, height_step = (
             WIDER * width,
-            WIDER * height_step if around else min(WIDER * height_step, TALLEST),
+            WIDER * height_step if full_turn else min(WIDER * height_step, TALLEST),
         )
     weight = 1 / variance_m2
     weight = weight / np.bincount(place, weight)[place]

@@ -141,11 +141,11 @@ class Component:
 
         waves  {shape: (n, 2 modes)} of `wave_columns`
         """
-        up = self.height_columns(heights)
+        profiles = self.height_columns(heights)
         if self.shape == "mean":
-            return up
+            return profiles
         # A product of covariances has the products of all pairs of columns.
-        return (waves[self.shape][:, :, None] * up[:, None]).reshape(len(up), -1)
+        return (waves[self.shape][:, :, None] * profiles[:, None]).reshape(len(profiles), -1)
 
     @property
     def is_level(self):
@@ -210,9 +210,9 @@ def log_covariance(smoothed=False):
     return correlation * np.outer(log_sd, log_sd)
 
 
-def _dent_covariance(apart):
+def _dent_covariance(difference):
     """Return h of a dent for a difference of heights."""
-    return np.exp(-np.abs(apart) / LOCAL_LENGTH)
+    return np.exp(-np.abs(difference) / LOCAL_LENGTH)
 
 
 def legendre(zeta, highest):
@@ -236,8 +236,8 @@ def plate_profiles(zeta):
     standard deviation BELL_SD. Without their means over the course, p = -2/3 P2 and b = -16/21 P2 +
     8/35 P4.
     """
-    free, held = np.array([-2 / 3, 0.0]), np.array([-16 / 21, 8 / 35])  # of P2 and P4
-    shapes = np.array([free + BELL * (held - free), BELL_SD * (held - free)])
+    hinged, clamped = np.array([-2 / 3, 0.0]), np.array([-16 / 21, 8 / 35])  # of P2 and P4
+    shapes = np.array([hinged + BELL * (clamped - hinged), BELL_SD * (clamped - hinged)])
     # Scale to a mean h of one: the mean squares of P2 and P4 are 1/5 and 1/9.
     shapes /= np.sqrt(np.sum(shapes**2 @ [1 / 5, 1 / 9]))
     return legendre(zeta, 4)[:, [2, 4]] @ shapes.T
@@ -328,32 +328,34 @@ def _correlate_seams(azimuth_rad, other_rad, radius_m):
     low_modes[0] *= np.array([b**-4, *2 * [2 / (1 + b**2) ** 2]]) / _seam_sum(b)
     correlations, mirrored = np.empty((len(first), len(second))), azimuth_rad is other_rad
     for start in range(0, len(first), at_once):
-        rows, to = slice(start, start + at_once), slice(start if mirrored else 0, None)
-        here = first[rows]
-        x = np.abs(np.subtract.outer(here, second[to]))
+        rows, columns = slice(start, start + at_once), slice(start if mirrored else 0, None)
+        azimuths = first[rows]
+        x = np.abs(np.subtract.outer(azimuths, second[columns]))
         np.minimum(x, FULL_TURN - x, out=x)
-        quotient = np.multiply.outer(np.exp(b * here), falls[to])
-        inverse_quotient = np.multiply.outer(np.exp(-b * here), grows[to])
+        quotient = np.multiply.outer(np.exp(b * azimuths), falls[columns])
+        inverse_quotient = np.multiply.outer(np.exp(-b * azimuths), grows[columns])
         # The smaller of exp(+-b (a - a')) is the direct way; the other way round has the factor
         # exp(-2 pi b).
-        near, around = (
+        direct, indirect = (
             np.minimum(quotient, inverse_quotient),
             np.maximum(quotient, inverse_quotient, out=quotient),
         )
-        around *= turn
-        np.maximum(near, around, out=near)
+        indirect *= turn
+        np.maximum(direct, indirect, out=direct)
         if b < NOT_AROUND:
-            far = turn / near
-            far *= far_by - x
+            far_term = turn / direct
+            far_term *= far_by - x
         else:
-            far = 0.0
+            far_term = 0.0
         x += near_by
-        near *= x
-        near += far
-        near *= scale
-        np.subtract(near, low_modes[0][rows] @ low_modes[1][to].T, out=correlations[rows, to])
+        direct *= x
+        direct += far_term
+        direct *= scale
+        np.subtract(
+            direct, low_modes[0][rows] @ low_modes[1][columns].T, out=correlations[rows, columns]
+        )
         if mirrored:
-            correlations[to, rows] = correlations[rows, to].T
+            correlations[columns, rows] = correlations[rows, columns].T
     return correlations
 
 
@@ -373,8 +375,8 @@ def weld_columns(azimuth_rad, welds_rad, radius_m):
     ndarray, shape (n, w)
         c(a - weld).
     """
-    away = np.subtract.outer(azimuth_rad, welds_rad)
-    return np.nan_to_num(seam_correlation(away, radius_m, WELD_LENGTH_M))
+    differences = np.subtract.outer(azimuth_rad, welds_rad)
+    return np.nan_to_num(seam_correlation(differences, radius_m, WELD_LENGTH_M))
 
 
 def mode_shares(modes, radius_m):
@@ -403,11 +405,11 @@ def _all_modes(x, b):
     x = np.minimum(x, FULL_TURN - x)
     turn = np.exp(-b * FULL_TURN)
     scale, near_by, far_by = _mode_terms(b, turn)
-    near = np.exp(-b * x)
-    total = near * (near_by + x)
+    near_term = np.exp(-b * x)
+    total = near_term * (near_by + x)
     if b < NOT_AROUND:  # otherwise the term of the other way round is rounding
-        far = turn / near
-        total += far * (far_by - x)
+        far_term = turn / near_term
+        total += far_term * (far_by - x)
     return scale * total
 
 

@@ -98,8 +98,10 @@ class Covariances:
                 if i not in common
             ]
             _add_products(block, np.hstack(own_columns))
-            both = (members, members) if isinstance(members, slice) else np.ix_(members, members)
-            covariance[both] += block
+            block_index = (
+                (members, members) if isinstance(members, slice) else np.ix_(members, members)
+            )
+            covariance[block_index] += block
         return covariance
 
     def spread(self, weights, index):

@@ -263,10 +263,10 @@ class WallField:
         """Free radius less the mean (courses, g), about the mean centre of the rings."""
         free, radii = self._solved[0], self._columns[1]
         turn = np.stack([np.sin(self.grid_rad), np.cos(self.grid_rad)])
-        circles, most = [], np.inf if self.plumbed is None else self.plumbed
+        circles, first_plumbed = [], np.inf if self.plumbed is None else self.plumbed
         for start, members in zip(radii, self._members, strict=True):
             ring = self.sites.ring[members]
-            members = members[(ring >= 0) & (ring < most)]
+            members = members[(ring >= 0) & (ring < first_plumbed)]
             if not len(members) or "oval" not in self.stated:
                 circles.append(np.full(len(self.grid_rad), free[start]))
                 continue

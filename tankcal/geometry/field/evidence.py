@@ -46,10 +46,10 @@ def likelihood_of(sites, radius_m, noise_m2, nominal_m, estimate_noise):
     -------
     Likelihood
     """
-    asked = _sample_readings(sites)
-    if len(asked) < len(sites):
-        selection = np.ix_(asked, asked) if np.ndim(noise_m2) == 2 else asked
-        sites, radius_m, noise_m2 = sites.take(asked), radius_m[asked], noise_m2[selection]
+    sample = _sample_readings(sites)
+    if len(sample) < len(sites):
+        selection = np.ix_(sample, sample) if np.ndim(noise_m2) == 2 else sample
+        sites, radius_m, noise_m2 = sites.take(sample), radius_m[sample], noise_m2[selection]
     common = _common_values(sites, nominal_m)
     if sites.shared is not None:
         radius_m = radius_m - _fit_free(sites, radius_m)
@@ -224,10 +224,10 @@ def _build_part(sites, radius_m, noise_m2, nominal_m, members, common, estimate_
         represented = values @ spread[common_ones.index(i)] @ values.T
         own_covariances.append(level - represented + smallest)
     own_covariances += [noise] * estimate_noise
-    least = LEAST_NOISE_M**2 * np.eye(basis.shape[1])
+    least_noise = LEAST_NOISE_M**2 * np.eye(basis.shape[1])
     return Part(
         basis.T @ radius_m[members],
         np.array(own_covariances),
-        least + noise * (not estimate_noise),
+        least_noise + noise * (not estimate_noise),
         values,
     )

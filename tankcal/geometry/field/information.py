@@ -48,8 +48,8 @@ def expect_amplitudes(field):
     information = np.array(
         [[0.5 * np.sum(first * second.T) for second in shares] for first in shares]
     )
-    held = np.diag(amplitudes.log_covariance) == 0
+    is_given = np.diag(amplitudes.log_covariance) == 0
     # Posterior information is prior information plus that of the readings; HELD avoids a singular
     # prior.
-    prior_information = np.linalg.inv(amplitudes.log_covariance + HELD**2 * np.diag(held))
+    prior_information = np.linalg.inv(amplitudes.log_covariance + HELD**2 * np.diag(is_given))
     return replace(amplitudes, log_covariance=np.linalg.inv(prior_information + information))

@@ -170,17 +170,17 @@ class Likelihood:
             step = -inverse @ current.slope
             # Trust region: no logarithm changes by more than `reach`.
             step *= reach / max(np.abs(step).max(), reach)
-            moved = np.clip(best + step, *self.bounds.T)
-            previous_length, length = length, np.abs(moved - best).max()
+            candidate_logs = np.clip(best + step, *self.bounds.T)
+            previous_length, length = length, np.abs(candidate_logs - best).max()
             if length < least_step:
                 break
-            candidate = Misfit(self, moved)
+            candidate = Misfit(self, candidate_logs)
             # The misfit increased: try again with a quarter of the step.
             if length > NEAR_TOP and candidate.value > current.value:
                 reach = length / 4
                 continue
-            inverse = improved(inverse, moved - best, candidate.slope - current.slope)
-            best, current, reach = moved, candidate, min(2 * reach, LOG_STEP)
+            inverse = improved(inverse, candidate_logs - best, candidate.slope - current.slope)
+            best, current, reach = candidate_logs, candidate, min(2 * reach, LOG_STEP)
             # At convergence or slow progress, replace the updated curvature by the exact one.
             refresh = length < AT_TOP or length > previous_length / 2
             if refresh and np.abs(best - taken_at).max() > AT_TOP:
@@ -195,8 +195,8 @@ class Likelihood:
         values, vectors = np.linalg.eigh(curvature)
         # The data never reduce the information: eigenvalues below the prior's are numerical or
         # indefinite.
-        least = 2 / np.linalg.eigvalsh(self.before)[-1]
-        return (vectors / np.maximum(values, least)) @ vectors.T
+        least_curvature = 2 / np.linalg.eigvalsh(self.before)[-1]
+        return (vectors / np.maximum(values, least_curvature)) @ vectors.T
 
 
 def prior_of(components, before=None, noise_m2=None):

@@ -80,8 +80,8 @@ class Misfit:
 
     def _of_logs(self, by_variances):
         """Convert a second derivative by variances to the logarithms, and add the prior."""
-        along = np.diag(self._variances * self._by_variances) + 2 * self._likelihood.precision
-        return self._variances[:, None] * by_variances * self._variances + along
+        diagonal = np.diag(self._variances * self._by_variances) + 2 * self._likelihood.precision
+        return self._variances[:, None] * by_variances * self._variances + diagonal
 
     @cached_property
     def _parts(self):
@@ -108,15 +108,15 @@ class Misfit:
         """Return y' P K_i P K_j P y, shape (variances, variances)."""
         likelihood = self._likelihood
         common = (likelihood.spread @ self._pull).T
-        within, between = 0.0, 0.0
+        inner_terms, cross_terms = 0.0, 0.0
         for part, (precision, by_root, pull) in zip(likelihood.parts, self._parts, strict=True):
             # K_i P y within the part: own components, then the common values.
             changes = np.column_stack([(part.own @ pull).T, part.values @ common])
             shared, by_pull = by_root.T @ changes, pull @ changes
-            within += changes.T @ _times(precision, changes) + np.outer(by_pull, by_pull)
-            within += shared.T @ shared
-            between += shared
-        return self._scattered(within - between.T @ between)
+            inner_terms += changes.T @ _times(precision, changes) + np.outer(by_pull, by_pull)
+            inner_terms += shared.T @ shared
+            cross_terms += shared
+        return self._scattered(inner_terms - cross_terms.T @ cross_terms)
 
     def _traces(self):
         """Return tr(P K_i P K_j), shape (variances, variances)."""

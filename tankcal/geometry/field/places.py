@@ -106,9 +106,11 @@ class OnCylinder:
 
     def across(self, departure, functionals):
         """Return the covariance (f, n) of `CylinderFunctionals` with a departure at the places."""
-        around = self._around(departure, functionals.turn_rad, self.turn_rad)
-        along = _fading(np.subtract.outer(functionals.along_m, self.along_m), departure.length_m)
-        covariance = np.einsum("ftn,tn->fn", functionals.weights @ along, around, optimize=True)
+        circumferential = self._around(departure, functionals.turn_rad, self.turn_rad)
+        axial = _fading(np.subtract.outer(functionals.along_m, self.along_m), departure.length_m)
+        covariance = np.einsum(
+            "ftn,tn->fn", functionals.weights @ axial, circumferential, optimize=True
+        )
         # The reference point at the bottom is separate from the grid of cells.
         at_point = self._around(departure, np.zeros(1), self.turn_rad)[0]
         at_point = at_point * _fading(functionals.point_m - self.along_m, departure.length_m)
@@ -117,9 +119,9 @@ class OnCylinder:
     def within(self, departure, functionals):
         """Return the covariance (f, f) of `CylinderFunctionals` due to a departure."""
         count = len(functionals.weights)
-        around = self._around(departure, functionals.turn_rad, functionals.turn_rad)
-        along = np.subtract.outer(functionals.along_m, functionals.along_m)
-        spread = around @ (functionals.weights @ _fading(along, departure.length_m))
+        circumferential = self._around(departure, functionals.turn_rad, functionals.turn_rad)
+        axial = np.subtract.outer(functionals.along_m, functionals.along_m)
+        spread = circumferential @ (functionals.weights @ _fading(axial, departure.length_m))
         flat = functionals.weights.reshape(count, -1)
         at_point = OnCylinder(self.radius_m, np.zeros(1), np.array([functionals.point_m]))
         # Covariance of the functionals with the point; it includes the weight of the point itself.

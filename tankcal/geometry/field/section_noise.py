@@ -72,8 +72,10 @@ def noise_of_sections(field, sections):
         whitened = np.zeros((len(explained), len(members)))
         whitened[members] = root
         whitened = scipy.linalg.solve_triangular(lower, whitened, lower=True, check_finite=False)
-        free = root.T @ by_columns[members]
-        inner = whitened.T @ whitened - free @ scipy.linalg.cho_solve(normal, free.T)
+        by_free_columns = root.T @ by_columns[members]
+        inner = whitened.T @ whitened - by_free_columns @ scipy.linalg.cho_solve(
+            normal, by_free_columns.T
+        )
         shares = np.clip(np.linalg.eigvalsh(inner), 0.0, 1.0)
         redundancy = shares.sum()
         square = np.sum((root.T @ explained[members]) ** 2)

@@ -95,8 +95,10 @@ class SolidField:
     @cached_property
     def _parts(self):
         """Covariances (departures, n, n) of the departures."""
-        each = zip(self.amplitudes.variances_m2, self.places.departures, strict=True)
-        return np.array([size * self.places.covariance(departure) for size, departure in each])
+        sized_departures = zip(self.amplitudes.variances_m2, self.places.departures, strict=True)
+        return np.array(
+            [size * self.places.covariance(departure) for size, departure in sized_departures]
+        )
 
     @property
     def _covariance(self):
@@ -120,16 +122,16 @@ class SolidField:
         """
         precision = restricted_precision(self._covariance, self.design)
         pull = precision @ self.distance_m
-        kept, rejected = np.ones(len(pull), dtype=bool), []
-        while np.count_nonzero(kept) > self.design.shape[1] + 1:
-            tested = against_others(precision, pull, kept)
-            deep = kept & (np.abs(tested.departure_m) > least_m)
+        accepted, rejected = np.ones(len(pull), dtype=bool), []
+        while np.count_nonzero(accepted) > self.design.shape[1] + 1:
+            tested = against_others(precision, pull, accepted)
+            deep = accepted & (np.abs(tested.departure_m) > least_m)
             statistics = np.where(deep, np.abs(tested.w), 0.0)
             worst = int(np.argmax(statistics))
             if not statistics[worst] > limit:
                 break
             rejected.append(worst)
-            kept[worst] = False
+            accepted[worst] = False
         return np.array(rejected, dtype=int)
 
     def estimated(self, functionals, by_shape):
@@ -143,15 +145,22 @@ class SolidField:
             Derivatives by the parameters of the shape, in the order of the design.
         """
         factor, by_columns, normal, beta, pull = self._solved
-        each = list(zip(self.amplitudes.variances_m2, self.places.departures, strict=True))
-        across = [size * self.places.across(departure, functionals) for size, departure in each]
-        total = sum(across)
+        sized_departures = list(
+            zip(self.amplitudes.variances_m2, self.places.departures, strict=True)
+        )
+        covariances = [
+            size * self.places.across(departure, functionals)
+            for size, departure in sized_departures
+        ]
+        total = sum(covariances)
         # A = (K_g + (X_g - K_g V^-1 X) (X' V^-1 X)^-1 X') V^-1, as in `estimate`.
         remainder = by_shape - total @ by_columns
         with_shape = total + scipy.linalg.cho_solve(normal, remainder.T).T @ self.design.T
         weights = scipy.linalg.cho_solve(factor, with_shape.T).T
         unseen = []
-        for (size, departure), part, covariance in zip(each, self._parts, across, strict=True):
+        for (size, departure), part, covariance in zip(
+            sized_departures, self._parts, covariances, strict=True
+        ):
             # K_gg - A K_g' - K_g A' + A K A' for each departure.
             cross_term = weights @ covariance.T
             difference = (

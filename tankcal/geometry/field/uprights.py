@@ -69,10 +69,12 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure, scatter
         precision = piece.precision(sizes[:-1], noise)[0][:, :]  # most of its columns are required
         return _eliminated(precision, precision @ centred, np.flatnonzero(~tested.accepted))
 
-    sizes, least = tested.sizes_m2, max(LEAST_M, LEAST_W * scatter_m)
+    sizes, least_jump = tested.sizes_m2, max(LEAST_M, LEAST_W * scatter_m)
     reduced = without(sizes)
     jumps = [_jump(*reduced, item) for item in all_columns if not sure[item].any()]
-    distant = [item for item in jumps if abs(item.size_m) > least and _is_tall(sites, item.members)]
+    distant = [
+        item for item in jumps if abs(item.size_m) > least_jump and _is_tall(sites, item.members)
+    ]
     # The largest jumps first; the remaining columns must suffice to estimate the amplitudes.
     distant.sort(key=lambda item: -abs(item.size_m))
     columns = [item.members for item in distant[: int(MOST_SHARE * len(all_columns))]]
@@ -83,7 +85,7 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure, scatter
         kept[np.concatenate(columns)] = False
         kept_readings = radius_m[kept], variance_m2[kept]
         sizes = likely_variances(sites.take(kept), *kept_readings, nominal_m, sizes)
-        count, columns = len(columns), _select_unlikely(*without(sizes), columns, least)
+        count, columns = len(columns), _select_unlikely(*without(sizes), columns, least_jump)
         if len(columns) == count:
             break
     for item in columns:
@@ -93,8 +95,8 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure, scatter
 
 def _select_unlikely(precision, pull, columns, least_m):
     """Return the columns with a significant jump of at least least_m."""
-    together = np.concatenate(columns)
-    block, block_pull = precision[np.ix_(together, together)], pull[together]
+    all_members = np.concatenate(columns)
+    block, block_pull = precision[np.ix_(all_members, all_members)], pull[all_members]
     limits, selected = np.cumsum([0, *map(len, columns)]), []
     for column, start, stop in zip(columns, limits, limits[1:], strict=False):
         members = np.arange(start, stop)
@@ -131,8 +133,10 @@ def _jump(precision, pull, column):
     size = column_pull.sum() / total
     # Jump of each reading without the others; readings with a small part of the jump do not share
     # it.
-    each = scipy.linalg.pinvh(weight, rtol=NOTHING_LEFT) @ column_pull
-    return _Jump(size, size * np.sqrt(total), column[each * np.sign(size) > PART * abs(size)])
+    single_jumps = scipy.linalg.pinvh(weight, rtol=NOTHING_LEFT) @ column_pull
+    return _Jump(
+        size, size * np.sqrt(total), column[single_jumps * np.sign(size) > PART * abs(size)]
+    )
 
 
 def _find_columns(sites, accepted, nominal_m):

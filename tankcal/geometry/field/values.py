@@ -121,10 +121,10 @@ class FieldValues:
         correlations = self._around(first, second)
         variances = np.empty((len(COMPONENTS), len(weights)))
         sizes = self._field.amplitudes.variances_m2
-        for index, (size, across) in enumerate(zip(sizes, self._across, strict=True)):
+        for index, (size, covariance) in enumerate(zip(sizes, self._across, strict=True)):
             # Diagonal of A K A' - 2 K_g A' + K_gg, term by term.
             variances[index] = size * self._covariances.spread_alone(weights, index)
-            variances[index] -= 2 * np.einsum("rn,rn->r", weights, of_places @ across)
+            variances[index] -= 2 * np.einsum("rn,rn->r", weights, of_places @ covariance)
             prior_variance = size * product * self._between(index, first, second, correlations)
             variances[index] += np.bincount(row, prior_variance, len(weights))
         return variances
@@ -231,6 +231,6 @@ def _enumerate_pairs(rows):
     count = np.diff(rows.indptr)
     row = np.repeat(np.arange(len(count)), count**2)
     # Number of the pair within its row; its quotient and remainder are the two places.
-    within = np.arange(len(row)) - np.repeat(np.cumsum(count**2) - count**2, count**2)
-    first, second = (rows.indptr[row] + part for part in np.divmod(within, count[row]))
+    pair_number = np.arange(len(row)) - np.repeat(np.cumsum(count**2) - count**2, count**2)
+    first, second = (rows.indptr[row] + part for part in np.divmod(pair_number, count[row]))
     return row, rows.indices[first], rows.indices[second], rows.data[first] * rows.data[second]

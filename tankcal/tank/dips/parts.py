@@ -99,8 +99,8 @@ def _zones_of_stretch(marks, bottom_m, top_m):
         if longest is None:
             start, place = ends[place], place + 1
             continue
-        beyond = min(place + size, len(ends))
-        reached, longest = _extend_zone(marks, start, ends, reached, beyond, longest)
+        upper_limit = min(place + size, len(ends))
+        reached, longest = _extend_zone(marks, start, ends, reached, upper_limit, longest)
         zones.append(longest)
         start, place = ends[reached], reached + 1
     return zones
@@ -146,10 +146,12 @@ class _Marks:
         # Rounding must not place the first or last mark outside the zone.
         marks = np.clip(multiples_of(self.mark_m, first, last), bottom_m, top_m)
         rows = multiples_of(self.row_step_m, 0, last // self.parts)[number // self.parts]
-        between = number % self.parts != 0
+        between_rows = number % self.parts != 0
         deviation = np.zeros(len(number))
-        table_m3 = self.volume_m3(rows[between]) + (number % self.parts)[between] * mean_m3
-        deviation[between] = table_m3 - self.volume_m3(marks[between])
+        table_m3 = (
+            self.volume_m3(rows[between_rows]) + (number % self.parts)[between_rows] * mean_m3
+        )
+        deviation[between_rows] = table_m3 - self.volume_m3(marks[between_rows])
         worst = first_of_largest(deviation) if len(number) else None
         zone = ProportionalParts(
             bottom_m=bottom_m,

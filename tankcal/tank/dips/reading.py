@@ -35,8 +35,8 @@ class Dips:
 
 def _line_of(height_m, u_m):
     """Return a dip and its standard uncertainty as text."""
-    shown = format_with_u(height_m, u_m, PROGRAM, least=3)
-    return f"{shown.value} m, u = {shown.uncertainty} m"
+    formatted = format_with_u(height_m, u_m, PROGRAM, least=3)
+    return f"{formatted.value} m, u = {formatted.uncertainty} m"
 
 
 def ullage_m(reference_height_m, dip_m):

@@ -114,9 +114,9 @@ def dip_label(height_m, height_unit="m"):
     marks = round(height_m / float(step))
     if abs(height_m - float(marks * step)) <= _ON_THE_MARK_M:
         feet, inches = divmod(marks * step / METRES_PER_INCH, INCHES_PER_FOOT)
-        whole, part = divmod(inches, 1)
+        whole_inches, part = divmod(inches, 1)
         fraction = f" {part.numerator}/{part.denominator}" if part else ""
-        return f"{feet}' {whole}{fraction}\""
+        return f"{feet}' {whole_inches}{fraction}\""
     # Between marks: round once to thousandths of an inch, so that 12 inches become a foot.
     thousandths = round(height_m / float(METRES_PER_INCH) * 1000)
     feet, inches = divmod(Fraction(thousandths, 1000), INCHES_PER_FOOT)

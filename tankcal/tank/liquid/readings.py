@@ -100,16 +100,16 @@ def _by_temperatures(metering, fill, reduced, volume_m3):
     """Return the change (n, temperatures) of the misclosures per degree of each reading."""
     b, volume, end, start = metering.expansion_per_k, volume_m3, fill.end, fill.start
     tank = metering.tank_c[fill.dip_row]
-    known = np.isfinite(metering.meter_c) & np.isfinite(tank[end])[:, None]
-    by_rows = b * np.where(known, reduced.by_row_m3, 0.0)
-    before = np.where(fill.from_empty, 0.0, reduced.carried * volume[start])
+    is_known = np.isfinite(metering.meter_c) & np.isfinite(tank[end])[:, None]
+    by_rows = b * np.where(is_known, reduced.by_row_m3, 0.0)
+    previous = np.where(fill.from_empty, 0.0, reduced.carried * volume[start])
     both_known = np.isfinite(tank[end]) & np.isfinite(tank[start]) & ~fill.from_empty
-    before = b * np.where(both_known, before, 0.0)
+    previous = b * np.where(both_known, previous, 0.0)
     by_dips = np.zeros((len(fill), len(volume)))
     lines = np.arange(len(fill))
     # A warmer tank at the end of a step: less volume arrived, and the previous content expanded.
-    by_dips[lines, end] -= by_rows.sum(axis=1) + before
-    by_dips[lines[both_known], start[both_known]] += before[both_known]
+    by_dips[lines, end] -= by_rows.sum(axis=1) + previous
+    by_dips[lines[both_known], start[both_known]] += previous[both_known]
     return np.hstack([by_rows[:, np.any(fill.batches, axis=0)], by_dips])
 
 

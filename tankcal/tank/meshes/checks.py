@@ -301,16 +301,18 @@ def _nesting_depths(vertices, faces, label, bodies, name):
         pairs, [len(v) for v in body_vertices], [len(group) for group in groups], name
     )
     for i, j in pairs:
-        near = np.flatnonzero(
+        candidates = np.flatnonzero(
             np.all((body_vertices[i] >= lowest[j]) & (body_vertices[i] <= highest[j]), axis=1)
         )
-        if len(near) == 0:
+        if len(candidates) == 0:
             continue
         # Only vertices within the box of the other body can be inside it.
-        probes = near[np.linspace(0, len(near) - 1, min(probe_count, len(near))).astype(int)]
+        probes = candidates[
+            np.linspace(0, len(candidates) - 1, min(probe_count, len(candidates))).astype(int)
+        ]
         winding_numbers = np.abs(windings(body_vertices[i][probes], vertices[groups[j]]))
         inside = np.any(winding_numbers > 1 - ON_SURFACE)
-        outside = np.any(winding_numbers < ON_SURFACE) or len(near) < len(body_vertices[i])
+        outside = np.any(winding_numbers < ON_SURFACE) or len(candidates) < len(body_vertices[i])
         if inside and outside:
             where = _format_point(body_vertices[i][probes[np.argmax(winding_numbers)]])
             raise problem(
@@ -378,11 +380,11 @@ def _solid_angles(points, corners):
     """Return half the solid angles (n,) of a surface (m, 3, 3), seen from points (n, 3)."""
     a, b, c = np.moveaxis(corners[None] - points[:, None, None], 2, 0)
     la, lb, lc = (np.sqrt(np.sum(side**2, axis=2)) for side in (a, b, c))
-    above = np.sum(a * np.cross(b, c), axis=2)
+    triple_product = np.sum(a * np.cross(b, c), axis=2)
     ab, bc, ca = (np.sum(p * q, axis=2) for p, q in ((a, b), (b, c), (c, a)))
     # tan(omega / 2) = a . (b x c) / (abc + (a.b) c + (b.c) a + (c.a) b).
-    half = np.arctan2(above, la * lb * lc + ab * lc + bc * la + ca * lb)
-    return np.sum(half, axis=1, where=np.abs(above) > FLAT * la * lb * lc)
+    half = np.arctan2(triple_product, la * lb * lc + ab * lc + bc * la + ca * lb)
+    return np.sum(half, axis=1, where=np.abs(triple_product) > FLAT * la * lb * lc)
 
 
 def _refuse_negative(mesh, name):

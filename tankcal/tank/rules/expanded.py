@@ -100,20 +100,20 @@ def judge_uncertainty(limit, table, lowest_m=None, printed=None):
                 end_m=table.height_m[-1],
             )
         )
-    judged = table.for_use(table.height_m)
-    if not np.any(judged):
+    judged_rows = table.for_use(table.height_m)
+    if not np.any(judged_rows):
         return UncertaintyVerdict(limit, "nothing_to_judge", None)
     printed = printed or printed_of_table(table)
-    capacity = float(table.volume_m3[judged][-1])
+    capacity = float(table.volume_m3[judged_rows][-1])
     if lowest_m is not None:
-        judged &= table.height_m >= lowest_m
+        judged_rows &= table.height_m >= lowest_m
     if limit.of == "deliveries":
         return _judge_deliveries(limit, _restrict_table(table, lowest_m), capacity, printed)
     if limit.of == "capacity":
-        judged &= np.arange(len(judged)) == np.flatnonzero(judged).max(initial=-1)
-    if not np.any(judged):
+        judged_rows &= np.arange(len(judged_rows)) == np.flatnonzero(judged_rows).max(initial=-1)
+    if not np.any(judged_rows):
         return UncertaintyVerdict(limit, "nothing_to_judge", None)
-    return _judge_rows(limit, table, printed.rows_m3, np.flatnonzero(judged), capacity)
+    return _judge_rows(limit, table, printed.rows_m3, np.flatnonzero(judged_rows), capacity)
 
 
 def _restrict_table(table, lowest_m):

@@ -86,9 +86,9 @@ def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
     deviation = tuple(verdict for verdict in pairs if verdict is not None)
     verdicts = (*uncertainty, *deviation)
     applied = [verdict.limit for verdict in verdicts]
-    judged = [v.limit for v in verdicts if v.code not in ("nothing_to_judge", "not_for_use")]
+    judged_limits = [v.limit for v in verdicts if v.code not in ("nothing_to_judge", "not_for_use")]
     # A limit without any verdict must be visible to the user.
-    unjudged = tuple(item.name for item in (*limits, *others) if item not in judged)
+    unjudged = tuple(item.name for item in (*limits, *others) if item not in judged_limits)
     return RuleVerdict(
         rule=rule,
         tank=tank,

@@ -74,14 +74,14 @@ def corrections_of(parts, even, soundings_m, top_m=np.inf):
     midpoints = (soundings[:-1] + soundings[1:]) / 2
     all_soundings = np.concatenate([soundings, midpoints])
     volumes = np.array([mesh.volume_m3(np.minimum(all_soundings, mesh.top_m)) for mesh in parts])
-    full = all_soundings >= np.array([mesh.top_m for mesh in parts])[:, None]
-    below = ~full & (volumes < even.dry_m3)
+    is_full = all_soundings >= np.array([mesh.top_m for mesh in parts])[:, None]
+    is_below = ~is_full & (volumes < even.dry_m3)
     even_m = np.full(volumes.shape, np.nan)
     # The volumes of all trims and lists are inverted at once.
-    even_m[~full & ~below] = soundings_of_volumes(even, volumes[~full & ~below])
-    full |= even_m > top_m
-    even_m[full] = np.nan
-    state = np.where(full, FULL, np.where(below, BELOW, READABLE))
+    even_m[~is_full & ~is_below] = soundings_of_volumes(even, volumes[~is_full & ~is_below])
+    is_full |= even_m > top_m
+    even_m[is_full] = np.nan
+    state = np.where(is_full, FULL, np.where(is_below, BELOW, READABLE))
     rows = len(soundings)
     return [
         CellCorrections(
