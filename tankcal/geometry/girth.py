@@ -187,7 +187,21 @@ class _ConditionedRing:
         self._root = np.linalg.cholesky(self._noise)
 
     def moved(self, outline_m, sizes, rng=None):
-        """Return an outline conditioned on the ring; with `rng`, with noise of the readings."""
+        """Return an outline conditioned on the ring.
+
+        Parameters
+        ----------
+        outline_m : ndarray, shape (n,)
+            Radii of an outline at evenly spaced azimuths, m.
+        sizes : dict of str to float
+            Variances of the shapes, m2.
+        rng : numpy.random.Generator, optional
+            Source of random noise of the readings; None: no noise.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+        """
         predicted = np.interp(self._ring.azimuth_rad, self._turn, outline_m, period=FULL_TURN)
         if rng is not None:
             predicted = predicted + self._root @ rng.normal(size=len(predicted))

@@ -382,8 +382,20 @@ class Body:
     def sources_by(self, levels_m, inputs, without=()):
         """Return `sources` with a line for each declared input of `inputs`.
 
-        The line is zero if the input does not affect the body, or is among `without`. Two bodies of
-        one tank (loaded by two liquids) then have equal sources in equal order.
+        Two bodies of one tank (loaded by two liquids) then have equal sources in equal order.
+
+        Parameters
+        ----------
+        levels_m : array_like, shape (rows,)
+            Levels, m.
+        inputs : iterable of str
+            Names of inputs. The line of an input that does not affect the body is zero.
+        without : sequence of str, optional
+            Names of inputs whose line is zero in any case.
+
+        Returns
+        -------
+        tuple of Source
         """
         derivatives = self.derivatives(levels_m)
         for name in inputs:

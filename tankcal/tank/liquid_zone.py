@@ -232,7 +232,17 @@ class Above(Part):
         return self.area_m2(levels_m)
 
     def moved_m3(self, levels_m, step_m, lowest_m, highest_m):
-        """Return the volume of the part, less that at `level_m`, which moves with the zero."""
+        """Return the volume of the part, less that at `level_m`, which moves with the zero.
+
+        Parameters
+        ----------
+        levels_m, step_m, lowest_m, highest_m
+            As for `Part.moved_m3`.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+        """
         if self.moves_with_zero:
             return self.volume_m3(levels_m)
         # The lower limit moves with the zero as well, so both ends are moved.

@@ -132,8 +132,16 @@ class LyingSolid(Solid):
 def pieces_of_ends(ends, length_m, last_ring=0, upward=1.0):
     """Yield the `Piece`s of the ends.
 
-    ends    (End, radius of the cylinder at the end) of A and of B
-    upward  as for `heads.meridian`
+    Parameters
+    ----------
+    ends : pair of (End, float)
+        End, and radius of the cylinder there, of A and of B.
+    length_m : float
+        Length of the cylinder.
+    last_ring : int, optional
+        Ring that carries end B.
+    upward : float, optional
+        As for `heads.meridian`.
     """
     places = ("a", 0.0, -1, 0), ("b", length_m, 1, last_ring)
     for (end, radius), (name, origin, outwards, ring) in zip(ends, places, strict=True):
@@ -158,7 +166,16 @@ def refuse_meeting_ends(ends, length_m):
 
 
 def check_directions(dip_direction, tilt, roll_rad=0.0):
-    """Raise SolutionError for an unknown direction of the dip, or angles that are not finite."""
+    """Raise SolutionError for an unknown direction of the dip, or angles that are not finite.
+
+    Parameters
+    ----------
+    dip_direction : str
+        "plumb" or "square".
+    tilt : float
+        Tangent of the tilt.
+    roll_rad : float, optional
+    """
     if dip_direction not in ("plumb", "square"):
         raise SolutionError(f"dip direction {dip_direction!r}: expected plumb or square")
     if not np.isfinite(tilt) or not np.isfinite(roll_rad):
@@ -168,7 +185,16 @@ def check_directions(dip_direction, tilt, roll_rad=0.0):
 def check_dip(dip_from_a_m, dip_direction, shift_m, length_m):
     """Raise SolutionError for a dip outside the cylinder.
 
-    shift_m  additional distance from A of a plumb dip at the top
+    Parameters
+    ----------
+    dip_from_a_m : float
+        Position of the zero of the dip along the cylinder.
+    dip_direction : str
+        "plumb" or "square".
+    shift_m : float
+        Additional distance from A of a plumb dip at the top.
+    length_m : float
+        Length of the cylinder.
     """
     low, high = dip_from_a_m, dip_from_a_m
     if dip_direction == "plumb":

@@ -88,9 +88,23 @@ class Part(Protocol):
         return derivatives["datum"] if "datum" in derivatives else self.area_m2(levels_m)
 
     def moved_m3(self, levels_m, step_m, lowest_m, highest_m):
-        """Return volumes with the zero of the table raised by step_m, in a tank between two levels.
+        """Return volumes with the zero of the table raised, in a tank between two levels.
 
         Volumes are never below empty; above the top, the part continues with the area at the top.
+
+        Parameters
+        ----------
+        levels_m : ndarray, shape (rows,)
+            Levels of the dips before the change, m.
+        step_m : float or ndarray, shape (rows,)
+            Rise of the zero, m.
+        lowest_m, highest_m : float
+            Levels of the empty and of the full tank, m.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+            m3.
         """
         # The volume belongs to the dip, not to the level in the tank.
         if self.moves_with_zero:

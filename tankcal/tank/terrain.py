@@ -160,7 +160,20 @@ class Surface:
 
 
 def surface(plan_m, faces, heights_m):
-    """Return the `Surface` over a mesh: plan (v, 2), faces (t, 3), heights (v,)."""
+    """Return the `Surface` over a mesh.
+
+    Parameters
+    ----------
+    plan_m : ndarray, shape (v, 2)
+        Plan coordinates of the vertices, m.
+    faces : ndarray of int, shape (t, 3)
+    heights_m : array_like, shape (v,)
+        Heights of the vertices, m.
+
+    Returns
+    -------
+    Surface
+    """
     heights = np.asarray(heights_m, dtype=float)
     a, b, c = np.moveaxis(plan_m[faces], 1, 0)
     (ux, uy), (vx, vy) = (b - a).T, (c - a).T

@@ -443,7 +443,19 @@ def azimuth_correlations(azimuth_rad, other_rad, radius_m):
 
 
 def seam_correlations(azimuth_rad, other_rad, radius_m):
-    """Return c (n, m) of "seam" between azimuths, as in `azimuth_correlations`."""
+    """Return c (n, m) of "seam" between azimuths, as in `azimuth_correlations`.
+
+    Parameters
+    ----------
+    azimuth_rad : ndarray, shape (n,)
+    other_rad : ndarray, shape (m,)
+    radius_m : float
+        Radius of the wall, m.
+
+    Returns
+    -------
+    ndarray, shape (n, m)
+    """
     first = np.nan_to_num(azimuth_rad)
     second = first if other_rad is azimuth_rad else np.nan_to_num(other_rad)
     correlations = _correlate_seams(first, second, radius_m)

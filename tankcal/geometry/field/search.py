@@ -77,9 +77,9 @@ def improved(inverse, step, slope_change):
     Parameters
     ----------
     inverse : ndarray, shape (n, n)
-    moved : ndarray, shape (n,)
-        Step.
-    turned : ndarray, shape (n,)
+        Inverse curvature before the step.
+    step : ndarray, shape (n,)
+    slope_change : ndarray, shape (n,)
         Change of the slope over the step.
 
     Returns

@@ -92,7 +92,18 @@ class Search:
 
 
 def kids_of(level, low, high):
-    """Return the pairs of blocks of the level below that make up given pairs."""
+    """Return the pairs of blocks of the level below that make up given pairs.
+
+    Parameters
+    ----------
+    level : Level
+    low, high : ndarray of int, shape (m,)
+        Indices of the lower and of the upper block of each pair.
+
+    Returns
+    -------
+    low, high : ndarray of int
+    """
     lower = np.repeat(level.kids[low], FAN, axis=1).ravel()
     upper = np.tile(level.kids[high], FAN).ravel()
     exist = (lower >= 0) & (upper >= 0)
@@ -100,10 +111,23 @@ def kids_of(level, low, high):
 
 
 def bounds_of(search, level, low, high):
-    """Return bounds (m,), the best size at the corners, and its dips, for m pairs of blocks.
+    """Return upper bounds of deliveries between pairs of blocks, and the best corner.
 
-    A bound is not exceeded by any delivery between the two blocks; it is -1 if none has the minimum
-    height.
+    Parameters
+    ----------
+    search : Search
+    level : Level
+    low, high : ndarray of int, shape (m,)
+        Indices of the lower and of the upper block of each pair.
+
+    Returns
+    -------
+    bounds : ndarray, shape (m,)
+        Bound that no delivery between the two blocks exceeds; -1 if none has the minimum height.
+    reached : float
+        Largest exact size at the corners of the blocks; -1 if none.
+    pair : tuple of two float or None
+        Dips of that size.
     """
     rows, groups = search.rows, search.rows.groups
     a, b, c, d = level.first[low], level.last[low], level.first[high], level.last[high]

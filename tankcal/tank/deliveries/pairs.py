@@ -72,7 +72,21 @@ def deliveries(table, low_m, high_m):
 
 
 def deliveries_between(rows, probability, low, high, for_use):
-    """Return deliveries between dips inside the table, in chunks of pairs."""
+    """Return deliveries between dips inside the table, in chunks of pairs.
+
+    Parameters
+    ----------
+    rows : Rows
+    probability : float
+        Coverage probability.
+    low, high : ndarray, shape (n,)
+        Dips, m.
+    for_use : ndarray of bool, shape (n,)
+
+    Returns
+    -------
+    Deliveries
+    """
     volume, u, w = np.empty((3, len(low)))
     for start in range(0, len(low), CHUNK):
         chunk = slice(start, start + CHUNK)

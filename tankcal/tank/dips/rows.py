@@ -100,7 +100,18 @@ def top_mark(top_m, height_unit="m", *, closed=False):
 
 
 def multiples_of(step_m, first, last):
-    """Return first * step, ..., last * step, each rounded once from the exact product."""
+    """Return first * step, ..., last * step, each rounded once from the exact product.
+
+    Parameters
+    ----------
+    step_m : float
+    first, last : int
+
+    Returns
+    -------
+    ndarray, shape (last - first + 1,)
+        m.
+    """
     numbers = np.arange(first, last + 1, dtype=float)
     step = step_m * _PER_METRE
     # Steps of whole nanometres give exact products; rows of other steps are rounded.

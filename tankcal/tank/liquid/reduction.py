@@ -192,7 +192,20 @@ def reduce_steps(metering, fill, volume_m3, growth=None):
 
 
 def density_ratio(metering, warm_c, cold_c):
-    """Return rho(warm) / rho(cold); 1 if either temperature is unknown."""
+    """Return rho(warm) / rho(cold) of the liquid.
+
+    Parameters
+    ----------
+    metering : object
+        Object with expansion_per_k and density_c.
+    warm_c, cold_c : ndarray
+        Temperatures, degC; nan: unknown.
+
+    Returns
+    -------
+    ndarray
+        1 if either temperature is unknown.
+    """
     relative = [1 - metering.expansion_per_k * (t - metering.density_c) for t in (warm_c, cold_c)]
     ratio = relative[0] / relative[1]
     return np.where(np.isfinite(ratio), ratio, 1.0)

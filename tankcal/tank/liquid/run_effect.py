@@ -68,10 +68,19 @@ def estimate_run_effect(weight, misclosure_m3, run_m3):
 
 
 def run_differences(weight, misclosure_m3, run_m3):
-    """Return (d, s): independent variables d of mean 0 and variances theta + s.
+    """Return independent variables of mean 0 and variances theta + s, and s.
 
     A common change of all runs acts like the factor of the meter. This direction has a large s, due
     to the uncertainty of the meter certificate and of the geometry, and hence little weight.
+
+    Parameters
+    ----------
+    weight, misclosure_m3, run_m3
+        As for `estimate_run_effect`.
+
+    Returns
+    -------
+    d, s : ndarray
     """
     information = run_m3.T @ weight @ run_m3
     size, turn = np.linalg.eigh(information)

@@ -226,7 +226,16 @@ def moments_below(corners, values, weights, heights, side="left"):
     Beyond the middle corner, it is the mean of the whole face less the corresponding term of the
     part above, from the other end.
 
-    values  (m, 3, c) at the corners; corners, heights and side as in `sums_below`
+    Parameters
+    ----------
+    corners, weights, heights, side
+        As for `sums_below`.
+    values : ndarray, shape (m, 3, c)
+        Values of the functions at the corners.
+
+    Returns
+    -------
+    ndarray, shape (rows, c)
     """
     rows, inverse = np.unique(heights, return_inverse=True)
     columns = values.shape[2]
@@ -281,7 +290,14 @@ class _Tree:
     def add(self, start, stop, foot, reach, amounts):
         """Add the sum of amounts[p] ((h - foot) / reach)^p to heights[start:stop].
 
-        amounts  {power: (m,) or (columns, m)}
+        Parameters
+        ----------
+        start, stop : ndarray of int, shape (m,)
+            Ranges of heights.
+        foot, reach : ndarray, shape (m,)
+            Origin and scale of each polynomial, m.
+        amounts : dict of int to ndarray, shape (m,) or (columns, m)
+            Coefficients of each power.
         """
         chosen = np.flatnonzero(start < stop)
         left, right = start[chosen] + self.leaves, stop[chosen] + self.leaves

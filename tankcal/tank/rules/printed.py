@@ -28,10 +28,24 @@ class Printed:
     factor: float = 1.0
 
     def of(self, table, low_m, high_m, U_m3):
-        """Return U of a volume (low_m None) or of a delivery, from U_m3 of the table.
+        """Return the printed U of a volume or of a delivery.
 
-        At a row, it is the U of the row. Between two rows, of which at least one differs from the
-        table, it is the largest U of the rows and the table.
+        Parameters
+        ----------
+        table : Capacity
+        low_m : float or None
+            Lower dip of a delivery, m; None: the volume below high_m.
+        high_m : float
+            Dip, m.
+        U_m3 : float
+            U of the table.
+
+        Returns
+        -------
+        float
+            For a delivery, the simulated U, otherwise `factor` times U of the table. For a volume
+            at a row, U of the row. Between two rows, of which at least one differs from the table,
+            the largest U of the rows and the table.
         """
         if low_m is not None:
             return self.pairs_m3.get((low_m, high_m), self.factor * U_m3)
