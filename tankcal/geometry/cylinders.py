@@ -97,9 +97,9 @@ def fit_cylinder(xyz_m, covariance_m2):
     """Fit a cylinder of any direction to the perpendicular distances of points.
 
     The condition for each point is: distance from the axis - R = 0. No start values are required.
-    The search evaluates the sum of squared algebraic distances in closed form for directions all
-    over the half sphere (Eberly 2019), and refines the best directions with unweighted distances.
-    Points on a part of the circumference suffice.
+    The search evaluates the sum of squared algebraic distances in closed form, for directions all
+    over the half sphere (Eberly 2019). It then refines the best directions with unweighted
+    distances. Points on a part of the circumference suffice.
 
     Parameters
     ----------

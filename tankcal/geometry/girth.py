@@ -139,8 +139,8 @@ def seen_excess(amplitudes, radius_m, rings):
     and the perimeter of its hull is computed. Waves that the points resolve thus agree with the
     readings; shorter waves are random. The distribution of the variance over the short waves is an
     assumption. Their part of the excess is the mean excess less that of the most likely outline K
-    V^-1 y. The standard deviation of this part is taken equal to its mean (exponential
-    distribution, the distribution of largest entropy above 0) and is added to the scatter of the
+    V^-1 y. The standard deviation of this part is taken equal to its mean, as for the exponential
+    distribution, the distribution of largest entropy above 0. It is added to the scatter of the
     simulation.
 
     Examples

@@ -6,8 +6,8 @@ counts above that plane (level 0),
     V(L) = integral over the plan of (L - z)+ - L+,
 
 so it is positive below the plane, and negative where the bottom is above the plane. A level L = z
-counts as wet. The difference between the wall and the outline of the plan, between the plane and
-the edge of the bottom, is neglected as the product of two small heights.
+counts as wet. Between the plane and the edge of the bottom, the wall may differ from the outline of
+the plan. This difference is neglected, as the product of two small heights.
 """
 
 from dataclasses import dataclass

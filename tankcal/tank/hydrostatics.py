@@ -72,7 +72,7 @@ class LiquidHead(Part):
     density_kg_m3  density of the liquid of the table; 0: the empty shell
     headroom_m  possible height of the liquid above the shell, in a head on top
     survey_density_kg_m3, survey_level_m  liquid during the survey; level above the bottom of the
-    first course
+                                          first course
     """
 
     volume: ShellVolume

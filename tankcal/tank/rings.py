@@ -132,14 +132,14 @@ class RingedTank(LyingSolid):
         ring_radii       (rows, rings) each ring separately; the ring of the dip also moves the zero
         dip_radius       radius of the wall only where the dip touches it
         ring_waves       (rows, rings x WAVES) wave cos(k a) of a ring, a from its bottom, the waves
-        of a ring together; the ring of the dip also moves the zero
+                         of a ring together; the ring of the dip also moves the zero
         ring_lengths     (rows, rings) each ring separately; the rings beyond move, A and the dip do
-        not
+                         not
         ring_axes        (rows, rings) height of the axis of each ring above the common axis
         end_depth, dish, knuckle, tilt, dip_position, datum, scale
                          as for `solids.LyingTank`
         plate_thickness  thickness subtracted from outside measurements: reduces all radii and the
-        depths of the ends, but not the lengths
+                         depths of the ends, but not the lengths
         paint            thickness subtracted from the radii alone
         """
         integrands = [Cut.segment, Cut.chord, Cut.chord_moment]

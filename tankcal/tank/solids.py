@@ -142,20 +142,20 @@ class LyingTank(LyingSolid):
         """Return {input: derivative (rows,) of the volume at a fixed dip}, with all else fixed.
 
         diameter         width and height together; ends keep their depths (torispherical: their
-        radii)
+                         radii)
         length           length of the cylinder; B moves, A and the position of the dip do not
         end_depth        depth of both ends in the direction of their bulge; flat ends have none,
-        torispherical ends of given radii are stretched along the axis
+                         torispherical ends of given radii are stretched along the axis
         dish, knuckle    radii of both ends, for torispherical ends of given radii
         tube_angle, tube_offset  position of the gauge tube, of a round tank only
         tilt             tangent of the tilt; the zero of the dip is fixed
         dip_position     dip_from_a_m
         plate_thickness  thickness subtracted from outside measurements: reduces the diameter by
-        twice the thickness, and the depth (or the radii) of each end by the thickness; the depth of
-        an inward end increases; the length is fixed
+                         twice the thickness, and the depth (or the radii) of each end by the
+                         thickness; the depth of an inward end increases; the length is fixed
         datum            height of the liquid at a given dip
         scale            scale of all lengths of the tank and of the position of the dip, but not of
-        the dips
+                         the dips
         """
         integrands = [Cut.segment, Cut.chord, Cut.chord_moment]
         inputs = ("radius", "end_depth", "end_plate", *RADII)

@@ -39,7 +39,7 @@ class SurveyedSurface:
     noise_dof, form_dof  degrees of freedom of the noise and of the form
     form_m2_per_m    b: variance of a height difference is 2 b distance
     waves_sd_m       standard deviation of waves finer than the points; including the noise if no
-    standard deviation is given
+                     standard deviation is given
     w                (n,) difference of each point from the prediction by all others, over its sd
     by_points_m2     (e, n) derivative of the volumes below the edges by the heights of the points
     """

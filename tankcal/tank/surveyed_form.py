@@ -1,8 +1,8 @@
 """Form of a surveyed wall about a solid: its height, and its volume at every level.
 
-A wall is not exactly a cylinder or sphere. With T the height of the solid, H the height of the
-surveyed wall from the bottom at the dip to the top, and V the volumes of the solid, the volumes of
-the wall are
+A wall is not exactly a cylinder or sphere. T is the height of the solid, and V are its volumes. H
+is the height of the surveyed wall, from the bottom at the dip to the top. The volumes of the wall
+are
 
     W(d) = V(d T / H) (1 + share + g(t) (1 + cos t)^1.5),   d = H (1 - cos t) / 2,
 

@@ -4,8 +4,8 @@
     rho(T) = rho_0 (1 - b (T - T_0))
 
 Division by rho(T_k) c_k gives a step  f v m / c_k = V(h_k) - q_k V(h_k-1)  with m = rho(Tm) /
-rho(T_k) and q = rho(T_k-1) c_k-1 / (rho(T_k) c_k). The metered volume less the right side is the
-misclosure.
+                                       rho(T_k) and q = rho(T_k-1) c_k-1 / (rho(T_k) c_k). The
+                                       metered volume less the right side is the misclosure.
 
 Source: conservation of mass; ISO 4269:2001 and API MPMS 12 for the corrections that it replaces.
 """

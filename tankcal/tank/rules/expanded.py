@@ -4,8 +4,8 @@ U(h) <= limit V(h), or limit V(top). With a constant k, U is convex between rows
 linear, so a limit met at two neighbouring rows is met between them. No quantity is divided, so the
 empty tank (V = 0) meets a limit only if U = 0 as well. Deliveries are judged over all dips by the
 law of propagation, and simulated deliveries by their printed U. The simulated deliveries are the
-worst one, and some to the lowest dip, where the volume cannot be negative and the errors of the two
-dips do not cancel according to the law of propagation (`deliveries_to_judge`).
+worst one, and some to the lowest dip (`deliveries_to_judge`). There the volume cannot be negative,
+and the errors of the two dips do not cancel according to the law of propagation.
 """
 
 from dataclasses import dataclass, replace

@@ -144,7 +144,8 @@ class PipedMesh(Part):
         surface    outward offset of the surface along its normal, m: the wetted area
         datum      zero of the pipe along the pipe, m
         trim, list  draught aft less draught forward, m, and the angle, rad; by the tangent of trim,
-        the derivative is A s u_x - moment of the free surface by x, and likewise for list by y
+                    the derivative is A s u_x - moment of the free surface by x, and likewise for
+                    list by y
         pipe_x, pipe_y  position of the whole pipe, m
         pipe_lean  (rows, 2) lean of the pipe about its lower end, m/m, fore and aft and athwart
         contraction  relative contraction of all lengths, if given
