@@ -93,8 +93,8 @@ def _run(job, progress, part_progress, simulated, cluster):
             )
         )
     original_job = job
-    surveyed = find_survey(job, progress, cluster=cluster, part_progress=part_progress)
-    job, survey, adjustment = surveyed.job, surveyed.survey, surveyed.adjustment
+    survey_result = find_survey(job, progress, cluster=cluster, part_progress=part_progress)
+    job, survey, adjustment = survey_result.job, survey_result.survey, survey_result.adjustment
     by_kind = _by_kind(survey)
     measured_liquid = None
     if job.liquid is not None:
@@ -102,13 +102,13 @@ def _run(job, progress, part_progress, simulated, cluster):
 
         progress(message("adjusting_liquid", "adjusting the runs by liquid with the geometry"))
         measured_liquid = measure_by_liquid(job, survey)
-    computed = compute_table(job, survey, progress, measured_liquid and measured_liquid.body)
-    body, zero, table = computed.body, computed.zero_m, computed.table
+    tabulation = compute_table(job, survey, progress, measured_liquid and measured_liquid.body)
+    body, zero, table = tabulation.body, tabulation.zero_m, tabulation.table
     # Effect of overruled readings on the volume and the level of the top row.
-    top = float(table.volume_m3[-1]), float(computed.levels_m[-1])
-    overruled = effect_of(original_job, surveyed, *top, progress)
+    top = float(table.volume_m3[-1]), float(tabulation.levels_m[-1])
+    overruled = effect_of(original_job, survey_result, *top, progress)
     progress(message("stating", "stating volumes and deliveries"))
-    stated = statements(job, table, computed.straightness.largest_m3)
+    stated = statements(job, table, tabulation.straightness.largest_m3)
     simulation = None
     # The intervals of the law of propagation hold unless a simulation replaces them.
     intervals = gum_intervals(table.volume_m3, table.u_m3, table.U_m3)
@@ -118,7 +118,7 @@ def _run(job, progress, part_progress, simulated, cluster):
         pairs = pairs_to_simulate(stated, job, body, table)
         simulation = simulate_table(job, survey, body, zero, table, pairs, progress=part_progress)
         intervals = simulation.intervals(table)
-    liquid = measured_liquid and measured_liquid.result(computed.levels_m)
+    liquid = measured_liquid and measured_liquid.result(tabulation.levels_m)
     ship = None
     if job.ship is not None:
         from tankcal.pipeline.ship import ship_tables
@@ -131,10 +131,10 @@ def _run(job, progress, part_progress, simulated, cluster):
         body=body,
         zero_m=zero,
         table=table,
-        straightness=computed.straightness,
-        proportional_parts=_parts(job, computed, intervals.U_m3),
-        corrections=_corrections(job, survey, computed, liquid),
-        by_density=_by_density(job, survey, computed.levels_m, zero, measured_liquid),
+        straightness=tabulation.straightness,
+        proportional_parts=_parts(job, tabulation, intervals.U_m3),
+        corrections=_corrections(job, survey, tabulation, liquid),
+        by_density=_by_density(job, survey, tabulation.levels_m, zero, measured_liquid),
         stated=stated,
         simulation=simulation,
         intervals=intervals,
@@ -142,17 +142,17 @@ def _run(job, progress, part_progress, simulated, cluster):
         warnings=_warnings(
             job,
             adjustment,
-            surveyed.sighting or surveyed.touching or surveyed.clouded,
+            survey_result.sighting or survey_result.touching or survey_result.clouded,
             survey,
-            computed,
+            tabulation,
             liquid,
             overruled,
         ),
         adjustment=adjustment,
         strapped=by_kind.get("strapped"),
-        sighting=surveyed.sighting,
-        touching=surveyed.touching,
-        clouded=surveyed.clouded,
+        sighting=survey_result.sighting,
+        touching=survey_result.touching,
+        clouded=survey_result.clouded,
         liquid=liquid,
         nominal=by_kind.get("nominal"),
         radii=by_kind.get("radii"),
@@ -172,7 +172,7 @@ def _by_kind(survey):
     return {result.surveyed_as: result for result in results if result is not None}
 
 
-def _warnings(job, adjustment, sighting, survey, computed, liquid, overruled):
+def _warnings(job, adjustment, sighting, survey, tabulation, liquid, overruled):
     """All warnings of a job, each with its place in the input."""
     adjustment_warnings, liquid_warnings = (), ()
     if adjustment is not None:
@@ -186,7 +186,7 @@ def _warnings(job, adjustment, sighting, survey, computed, liquid, overruled):
         *job.warnings,
         *adjustment_warnings,
         *warn_of_overrulings(job, overruled),
-        *check_table(job, survey, computed, sighting),
+        *check_table(job, survey, tabulation, sighting),
         *liquid_warnings,
         *incomplete_certificate(job),
     )
@@ -263,7 +263,7 @@ def _refuse_other(job, name):
         raise TypeError(f"found {type(job).__name__}; expected a Job: {name}(tankcal.load(path))")
 
 
-def _parts(job, computed, U_m3):
+def _parts(job, tabulation, U_m3):
     """Proportional parts of a centimetre table, if their error is a small part of U.
 
     Only vertical tanks have proportional parts; other tanks give ().
@@ -273,24 +273,24 @@ def _parts(job, computed, U_m3):
     if job.tank.kind != "vertical" or not is_centimetres:
         return ()
     # Interpolation must not cross a break of the volume curve: each part ends at a breakpoint.
-    edges = np.unique(np.round([0.0, *computed.breakpoints_m, computed.top_m], 3))
+    edges = np.unique(np.round([0.0, *tabulation.breakpoints_m, tabulation.top_m], 3))
     allowed = np.maximum(PARTS_OF_U * np.minimum(U_m3, UNBOUNDED_U_M3), PARTS_M3)
 
     def bound_m3(dips_m):
-        return np.interp(dips_m, computed.table.height_m, allowed)
+        return np.interp(dips_m, tabulation.table.height_m, allowed)
 
-    return proportional_parts(computed.volume_m3, edges, spec.step_m, PARTS, bound_m3)
+    return proportional_parts(tabulation.volume_m3, edges, spec.step_m, PARTS, bound_m3)
 
 
-def _corrections(job, survey, computed, liquid):
+def _corrections(job, survey, tabulation, liquid):
     """Corrections of the table; with a table by liquid, the effect of the liquid is the last."""
-    corrections = corrections_of(job, survey, computed.over_m)
+    corrections = corrections_of(job, survey, tabulation.over_m)
     if liquid is None or liquid.certified == "geometry":
         return corrections
-    gross = gross_at_top(job, survey, computed.over_m)
+    gross = gross_at_top(job, survey, tabulation.over_m)
     return (
         *corrections,
-        correction_by_liquid(corrections, gross, float(computed.table.volume_m3[-1])),
+        correction_by_liquid(corrections, gross, float(tabulation.table.volume_m3[-1])),
     )
 
 
