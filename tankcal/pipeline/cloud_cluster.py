@@ -236,8 +236,7 @@ def _keep_memory():
     """Let malloc keep freed memory.
 
     Dask makes its workers return freed memory at once. Each array of a few hundred kilobytes would
-    then
-    need fresh pages, and reading a LAS file took twice as long.
+    then need fresh pages, and reading a LAS file took twice as long.
     """
     with contextlib.suppress(OSError, AttributeError, TypeError):  # mallopt exists on Linux only
         malloc = ctypes.CDLL(None).mallopt

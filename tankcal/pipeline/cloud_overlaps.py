@@ -44,8 +44,7 @@ class Overlap:
         Root mean square of the part of the differences that a shift between the scans explains.
     w : float
         Test quantity of this part against registration, offset and incidence, equivalent to |w| of
-        a
-        single reading.
+        a single reading.
     is_apart : bool
         True if the registration does not explain the differences.
     """
@@ -161,8 +160,7 @@ def overlap_test(job, cells, registration):
     """Test the registration by all overlaps together.
 
     A pair of scans tests few directions. A registration with twice the declared uncertainty shows
-    in
-    all overlaps. The differences are whitened by their covariance without the registration. The
+    in all overlaps. The differences are whitened by their covariance without the registration. The
     singular directions of the registration that exceed the noise are tested.
 
     Parameters

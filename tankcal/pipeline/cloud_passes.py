@@ -27,8 +27,8 @@ class Reading:
     ----------
     cluster : None, "auto", "local", int or str
         None: this process; "auto": local workers for large clouds; "local": as many workers as
-        there
-        are cores; an integer: number of local workers; an address: the scheduler of a dask cluster.
+        there are cores; an integer: number of local workers; an address: the scheduler of a dask
+        cluster.
     part_progress : callable or None
         part_progress(text, points read, points in all).
     """

@@ -20,10 +20,8 @@ def refusal_of_units(placing, sizes, refused):
     """Return the error that no wall was found, or an error that names the files in another unit.
 
     Each file is examined alone, with its scans scaled to each unit. The scale applies about the
-    scanner
-    if the pose comes from targets, and about the origin if the pose comes from the file. A format
-    that
-    defines its unit allows no other unit. If a wall was found, the unit is right.
+    scanner if the pose comes from targets, and about the origin if the pose comes from the file. A
+    format that defines its unit allows no other unit. If a wall was found, the unit is right.
 
     Parameters
     ----------

@@ -267,8 +267,7 @@ def _refuse_scans_apart(job, cells, registration):
     """Raise InputError if scans show two walls that their registration does not reconcile.
 
     Within the uncertainty of the registration, two walls are treated as the same wall. Beyond it,
-    the
-    registration is wrong or a scan shows another surface, and the table could belong to either
+    the registration is wrong or a scan shows another surface, and the table could belong to either
     wall.
     """
     if cells.are_apart:

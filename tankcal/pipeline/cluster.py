@@ -126,9 +126,8 @@ def _client_of(workers, worker_bytes, more):
 def _greet(address):
     """Raise InputError if no dask scheduler answers at an address.
 
-    A greeting begins with its length. Without this check, dask would try to allocate the wrong
-    length
-    that another service sends, and would wait long for a silent port.
+    A greeting begins with its length. Without this check, dask may read a length beyond the memory
+    from another service, and waits long for a silent port.
     """
     try:
         url = urlsplit(address if "://" in address else f"tcp://{address}")

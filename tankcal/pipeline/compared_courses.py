@@ -27,10 +27,8 @@ def exchanged_courses(outside_m, plates_m, candidates):
     -------
     (int, int, float, float) or None
         The pair, the sum of the steps after its exchange, and the sum as read, m. None if the
-        exchange
-        reduces the sum too little, or if an exchange improves more than one in twenty simulated
-        shells
-        with the same scatter as much by chance.
+        exchange reduces the sum too little, or if an exchange improves more than one in twenty
+        simulated shells with the same scatter as much by chance.
 
     Examples
     --------
@@ -87,8 +85,7 @@ def course_apart(inside_m, least_m):
     -------
     (int, float) or None
         The course, and its radius less the mean radius of the others, m. None if one in twenty
-        valid
-        shells or more would have so large a difference by chance.
+        valid shells or more would have so large a difference by chance.
 
     Notes
     -----

@@ -46,10 +46,8 @@ def corrections_of(job, survey, over_m=0.0):
     """Return every correction that applies to the job, in the order of application.
 
     The size of a correction is the volume with it and all previous corrections, less the volume
-    with
-    the previous corrections. The surveyed sections already include the tilt: its size is the error
-    of
-    sections square to the axis.
+    with the previous corrections. The surveyed sections already include the tilt: its size is the
+    error of sections square to the axis.
 
     Parameters
     ----------
