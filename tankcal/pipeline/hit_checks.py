@@ -83,10 +83,10 @@ def _check_control(job):
     targets = repeats_of(job.hits.control)
     factor = repeat_factor(sum(3 * len(target.rows) for target in targets))
     for target in targets:
-        distance_limit, angle_limit = (factor * sd for sd in _sds_of(job.hits, target.setup))
-        # The limit is at least the spread that the declared standard deviations let expect.
-        angle = max(limits["control_angle_gon"] * GON, angle_limit)
-        distance = max(limits["control_distance_mm"] / 1000, distance_limit)
+        distance_spread, angle_spread = (factor * sd for sd in _sds_of(job.hits, target.setup))
+        # Below the spread due to the declared standard deviations, chance would exceed the limit.
+        angle = max(limits["control_angle_gon"] * GON, angle_spread)
+        distance = max(limits["control_distance_mm"] / 1000, distance_spread)
         for name, values, limit, scale, unit in (
             ("direction", target.direction_rad, angle, GON / 1000, "mgon"),
             ("zenith", target.zenith_rad, angle, GON / 1000, "mgon"),
@@ -178,9 +178,8 @@ def _check_courses(job, sighting):
         index = names.index(name)
         if not joints[index] - OVER_JOINT_M <= z[hit] <= joints[index + 1] + OVER_JOINT_M:
             course_there = names[int(course_of(z[hit], joints))]
-            course_there = (
-                "" if course_there == name else course_there
-            )  # beyond the bottom or the top
+            # No course lies beyond the bottom or the top.
+            course_there = "" if course_there == name else course_there
             misplaced.setdefault((name, course_there), []).append(hit)
     for (name, course_there), places in misplaced.items():
         text = (
@@ -265,7 +264,6 @@ def _check_setups(job, wall, sighting):
     if worst is None:
         return
     _, turned, shift = moved[worst["setup"]]
-    # x
     # The movement of the hits: by the shift of the station, or by the rotation at the median
     # distance.
     moved_m = max(float(np.hypot(*shift)), abs(turned) * float(np.median(np.hypot(*away.T))))

@@ -51,7 +51,8 @@ def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
         estimates = wall.told
         if estimates is None or estimates.largest_m < SETTLED_M:
             break
-        if len(estimates.poses):  # poses absorb a part of the form: keep its size
+        if len(estimates.poses):
+            # Poses absorb a part of the form, which later rounds no longer see: keep its size.
             sizes = wall.field.amplitudes
         poses = settled(sighting.poses, estimates.poses)
         sighted = sight(job.hits, poses, estimates.offsets_m)
@@ -206,7 +207,7 @@ def through_wall(job, points, normal, is_moved):
     points : Points
     normal : ndarray, shape (n, 3)
         Normals of the wall, outwards.
-    moved : ndarray of bool, shape (n,)
+    is_moved : ndarray of bool, shape (n,)
         Points that are not on the side of the survey.
 
     Returns
@@ -234,7 +235,10 @@ def through_wall(job, points, normal, is_moved):
 
 
 def _refuse_unknown_offset(job, sighting):
-    """Raise InputError for an undeclared offset that neither tape nor hits from both sides determine."""
+    """Raise InputError for an undeclared offset without any control.
+
+    A tape, or hits from both sides of the wall, determine an offset.
+    """
     is_strapped = job.strapping is not None and any(
         not strap.check for strap in job.strapping.straps
     )
