@@ -113,7 +113,7 @@ def measure_by_liquid(job, survey):
 
 
 def _require_convergence(adjustment):
-    """Return a converged adjustment; raise SolutionError, with the likely cause, if it did not converge."""
+    """Return an adjustment that converged, otherwise raise SolutionError with the likely cause."""
     if adjustment.is_settled:
         return adjustment
     verdicts = [
@@ -253,7 +253,7 @@ def _steps(adjustment):
 
 
 def _by_head(adjustment):
-    """Change (n,) of the increments of the geometry, from the calibrating liquid to the liquid of the table."""
+    """Change (n,) of the increments by geometry, from the calibrating liquid to the table's."""
     geometry, fill = adjustment.known.geometry, adjustment.fill
     volumes = geometry.body().volume_m3(adjustment.loaded.level_m)
     return fill.differences() @ (volumes - adjustment.loaded.volume_m3)

@@ -164,7 +164,7 @@ def _is_steady(before, latest):
 
 
 def _move_sizes(latest, fill):
-    """Return the adjustment with the sizes moved to their estimates, by steps that never fit worse."""
+    """Return the adjustment with the sizes at their estimates, by steps that never fit worse."""
 
     def same_run(*_):
         return latest.run_effect
@@ -190,7 +190,7 @@ def _spread(adjustment):
 
 
 def _search_step(latest, targets, fill, run_effect):
-    """Best `LiquidFound` between the present sizes and the target, or None if none improves the fit."""
+    """Best `LiquidFound` between the present sizes and the targets, or None if all fit worse."""
     geometry, best = latest.known.geometry, None
     present = {name: geometry.moves.get(name, 0.0) for name in targets}
     # Halve the step until the fit gets worse again after an improvement.
@@ -243,8 +243,7 @@ def adjusted_at(geometry, fill, run_effect, corrections_m=None):
     moved_inputs = tuple(
         (places[name], geometry.moves.get(name, 0.0) / places[name].u) for name in geometry.movable
     )
-    # The misclosure at the dips as read is that at the corrected dips plus the linear effect of the
-    # corrections (T A e0 above).
+    # The term T A e0 of the equation above: the dips are unknown about their values as read.
     held = reduced.misclosure_m3 + by_step @ (linearization[1] * corrections_m[rows])
     # Sizes already moved are unknowns about their initial values: restore their linear effect.
     misclosure = held.copy()
@@ -278,13 +277,13 @@ def adjusted_at(geometry, fill, run_effect, corrections_m=None):
 
 
 def _misfit(adjusted, misclosure, sources, moved):
-    """Chi-square of misclosures (n,) with the moved inputs held at their values, plus that of the inputs."""
+    """Chi-square of misclosures (n,) with the moved inputs held, plus that of these inputs."""
     if not moved:
         return adjusted.chi2
     held_columns = np.stack([column_of(sources, place) for place, _ in moved], axis=1)
     columns = [effect.columns for effect in (*adjusted.noise, *adjusted.effects)]
     all_columns = np.hstack(columns)
-    # Inputs held fixed contribute no covariance to the misclosures, but their own deviates.
+    # Inputs held at their values add no covariance to the misclosures; their deviates count.
     covariance = all_columns @ all_columns.T - held_columns @ held_columns.T
     deviates = np.array([deviate for _, deviate in moved])
     fit = misclosure @ np.linalg.solve(covariance, misclosure)
@@ -414,12 +413,15 @@ def _meter_sources(effect, metering, fill):
 
 
 def _moves_of(adjustment, names):
-    """Moves of inputs in all, and their standard deviations, according to the adjustment, {input: SI}."""
-    liquid, places = adjustment.adjusted, {}
+    """Total moves of inputs and their standard deviations, according to the adjustment.
+
+    Both are dicts {input: value, SI}.
+    """
+    result, places = adjustment.adjusted, {}
     for place in places_of(adjustment.known.sources, adjustment.known.geometry.job.inputs).values():
         places[place.name] = place
     moves, sds = {}, {}
-    geometry = liquid.effects[0].columns
+    geometry = result.effects[0].columns
     for name in names:
         place = places[name]
         moves[name] = float(place.u * (place.row @ adjustment.known.z))
@@ -427,7 +429,7 @@ def _moves_of(adjustment, names):
         # Posterior variance of the deviate: its prior variance less the part that the misclosures
         # determine.
         variance = max(
-            float(place.row @ place.row - by_misclosures @ liquid.weight @ by_misclosures), 1e-12
+            float(place.row @ place.row - by_misclosures @ result.weight @ by_misclosures), 1e-12
         )
         sds[name] = place.u * np.sqrt(variance)
     return moves, sds

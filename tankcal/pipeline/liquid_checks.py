@@ -67,7 +67,7 @@ def _check_agreement(metering, result):
 
 
 def _check_leak(metering, result):
-    """Warn of a drift with time, by its own test at the level of one in 1000, if no cause is named."""
+    """Warn of a drift with time, by a test at the level of one in 1000, if no cause is named."""
     leak = next((verdict for verdict in result.causes if is_steady_leak(verdict)), None)
     is_named = any(verdict.is_named for verdict in result.causes)
     if leak is None or is_named or abs(leak.w) <= CRITICAL:
