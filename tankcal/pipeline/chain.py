@@ -79,12 +79,13 @@ def run(
     >>> print(result.at(9.5))
     1249.8 m3, U = 1.5 m3 (k = 1.96)
     """
-    _refuse_other(job, "run")
+    _require_job(job, "run")
     with _problems_placed(job):
         return _run(job, progress or (lambda text: None), part_progress, simulated, cluster)
 
 
 def _run(job, progress, part_progress, simulated, cluster):
+    """`Result` of a job; parameters as `run`."""
     if job.tank is None:
         raise InputError(
             Problem(
@@ -95,7 +96,8 @@ def _run(job, progress, part_progress, simulated, cluster):
     original_job = job
     survey_result = find_survey(job, progress, cluster=cluster, part_progress=part_progress)
     job, survey, adjustment = survey_result.job, survey_result.survey, survey_result.adjustment
-    by_kind = _by_kind(survey)
+    by_kind = _results_by_kind(survey)
+    # The table may be that of liquid: the metered runs are adjusted first.
     measured_liquid = None
     if job.liquid is not None:
         from tankcal.pipeline.liquid import measure_by_liquid
@@ -132,14 +134,14 @@ def _run(job, progress, part_progress, simulated, cluster):
         zero_m=zero,
         table=table,
         straightness=tabulation.straightness,
-        proportional_parts=_parts(job, tabulation, intervals.U_m3),
-        corrections=_corrections(job, survey, tabulation, liquid),
-        by_density=_by_density(job, survey, tabulation.levels_m, zero, measured_liquid),
+        proportional_parts=_proportional_parts(job, tabulation, intervals.U_m3),
+        corrections=_list_corrections(job, survey, tabulation, liquid),
+        by_density=_volumes_by_density(job, survey, tabulation.levels_m, zero, measured_liquid),
         stated=stated,
         simulation=simulation,
         intervals=intervals,
         rule=verdict_of(job, body, table, intervals, simulation),
-        warnings=_warnings(
+        warnings=_collect_warnings(
             job,
             adjustment,
             survey_result.sighting or survey_result.touching or survey_result.clouded,
@@ -163,7 +165,7 @@ def _run(job, progress, part_progress, simulated, cluster):
     )
 
 
-def _by_kind(survey):
+def _results_by_kind(survey):
     """Map each kind of survey to its result.
 
     With declared radii, a survey that checks them is included.
@@ -172,7 +174,7 @@ def _by_kind(survey):
     return {result.surveyed_as: result for result in results if result is not None}
 
 
-def _warnings(job, adjustment, sighting, survey, tabulation, liquid, overruled):
+def _collect_warnings(job, adjustment, sighting, survey, tabulation, liquid, overruled):
     """All warnings of a job, each with its place in the input."""
     adjustment_warnings, liquid_warnings = (), ()
     if adjustment is not None:
@@ -241,7 +243,7 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> "Adju
     >>> len(adjusted.names), adjusted.xyz_m.shape == (len(adjusted.names), 3)
     (167, True)
     """
-    _refuse_other(job, "adjust_job")
+    _require_job(job, "adjust_job")
     if job.measurements is None:
         raise InputError(
             Problem(
@@ -257,13 +259,13 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> "Adju
     return replace(adjustment, warnings=placed(job, warnings))
 
 
-def _refuse_other(job, name):
+def _require_job(job, name):
     """Raise TypeError if `job` is not a `Job`; name: the function that was called."""
     if not isinstance(job, Job):
         raise TypeError(f"found {type(job).__name__}; expected a Job: {name}(tankcal.load(path))")
 
 
-def _parts(job, tabulation, U_m3):
+def _proportional_parts(job, tabulation, U_m3):
     """Proportional parts of a centimetre table, if their error is a small part of U.
 
     Only vertical tanks have proportional parts; other tanks give ().
@@ -282,7 +284,7 @@ def _parts(job, tabulation, U_m3):
     return proportional_parts(tabulation.volume_m3, edges, spec.step_m, PARTS, bound_m3)
 
 
-def _corrections(job, survey, tabulation, liquid):
+def _list_corrections(job, survey, tabulation, liquid):
     """Corrections of the table; with a table by liquid, the effect of the liquid is the last."""
     corrections = corrections_of(job, survey, tabulation.over_m)
     if liquid is None or liquid.certified == "geometry":
@@ -294,7 +296,7 @@ def _corrections(job, survey, tabulation, liquid):
     )
 
 
-def _by_density(job, survey, levels, zero_m, measured_liquid):
+def _volumes_by_density(job, survey, levels, zero_m, measured_liquid):
     """Volumes at the rows of the table for each further density of the liquid.
 
     Density changes the liquid head and the draught of a floating roof.

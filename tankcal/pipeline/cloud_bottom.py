@@ -81,7 +81,7 @@ def find_inside(job, passes, cloud_wall, telling):
     return CloudInside(bottom, bottom_points(bottom, MOST_POINTS), things)
 
 
-def with_bottom(job, inside, registration, told=()):
+def with_bottom(job, inside, registration, estimates=()):
     """Return the job with the points of its bottom and the causes that their heights share.
 
     Parameters
@@ -90,7 +90,7 @@ def with_bottom(job, inside, registration, told=()):
     inside : CloudInside or None
         None: the job is returned unchanged.
     registration : Registration
-    told : sequence of ToldCause
+    estimates : sequence of ToldCause
         Offsets without a prior that the wall estimated: they are corrected, and their remaining
         standard uncertainty is kept.
 
@@ -105,7 +105,7 @@ def with_bottom(job, inside, registration, told=()):
     # it.
     point, scan = np.nonzero(points.share)
     weight, n = points.share[point, scan], len(points.xyz_m)
-    estimated = {cause.name: cause for cause in told if np.isinf(cause.u_before)}
+    estimated = {cause.name: cause for cause in estimates if np.isinf(cause.u_before)}
     values = {name: cause.value for name, cause in estimated.items()}
     vertical = np.tile([0.0, 0.0, 1.0], (len(point), 1))
     shared = shared_by_beams(

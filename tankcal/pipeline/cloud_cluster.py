@@ -89,7 +89,17 @@ class ClusterPasses:
             return self._reduced(_sample_part, _add_samples, most)
 
     def cells(self, surface, grid, scans):
-        """Return the `WallCells` of all points."""
+        """Return the `WallCells` of all points.
+
+        Parameters
+        ----------
+        surface, grid, scans
+            As for `tankcal.clouds.wall.cells.WallCells`.
+
+        Returns
+        -------
+        WallCells
+        """
         with failures_told():
             packed = self._reduced(_cells_part, _add_cells, surface, grid, scans)
         cells = WallCells(surface, grid, scans)

@@ -69,7 +69,7 @@ class Placing:
     @classmethod
     def of(cls, clouds, registration):
         """Return the `Placing` of the clouds of a job and the `Registration` of their scans."""
-        files = tuple(replace(file, header=_from_root(file.header)) for file in clouds.files)
+        files = tuple(replace(file, header=_absolute_header(file.header)) for file in clouds.files)
         places = registration.rotation, registration.place_m
         return cls(files, clouds.scans, clouds.ranging, *places)
 
@@ -207,7 +207,17 @@ class JobPasses:
         return self.gather(sample_of, most)
 
     def cells(self, surface, grid, scans):
-        """Return the `WallCells` of all points."""
+        """Return the `WallCells` of all points.
+
+        Parameters
+        ----------
+        surface, grid, scans
+            As for `tankcal.clouds.wall.cells.WallCells`.
+
+        Returns
+        -------
+        WallCells
+        """
         return self.gather(cells_of, surface, grid, scans)
 
     def gather(self, taken_of, *sizes):
@@ -248,7 +258,7 @@ class Telling:
             self._part(self._text, int(read), int(max(read, about)))
 
 
-def _from_root(header):
+def _absolute_header(header):
     """Header with the absolute path of its file: the working directory of a worker may differ."""
     return replace(header, path=header.path.absolute())
 

@@ -231,6 +231,7 @@ def _fingerprint(file):
 
 
 def _nominal_radius_m(job):
+    """Nominal radius of the tank, m."""
     return job.tank.nominal_diameter_m / 2
 
 

@@ -68,12 +68,12 @@ def open_client(workers, *, worker_bytes=WORKER_BYTES, settings=()):
                 command=install_command("cluster"),
             )
         )
-    with _quiet(), _client_of(workers, worker_bytes, dict(settings)) as client:
+    with _silence_dask(), _client_of(workers, worker_bytes, dict(settings)) as client:
         yield client
 
 
 @contextlib.contextmanager
-def _quiet():
+def _silence_dask():
     """Suppress the log and the warnings of dask; this module reports its errors."""
     logger = logging.getLogger("distributed")
     before = logger.level
@@ -95,7 +95,7 @@ def _client_of(workers, worker_bytes, more):
     with contextlib.ExitStack() as stack:
         if isinstance(workers, str):
             address = workers
-            _greet(address)
+            _check_greeting(address)
         else:
             memory = {"pause": False, "spill": False, "target": False}
             settings = {
@@ -117,13 +117,13 @@ def _client_of(workers, worker_bytes, more):
         try:
             client = stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
         except Exception as error:  # a port of another service may cause any error
-            raise _no_answer(address, error) from error
+            raise _no_answer_error(address, error) from error
         with failures_told():
             _check_workers(client, workers)
         yield client
 
 
-def _greet(address):
+def _check_greeting(address):
     """Raise InputError if no dask scheduler answers at an address.
 
     A greeting begins with its length. Without this check, dask may read a length beyond the memory
@@ -145,7 +145,7 @@ def _greet(address):
         if LENGTH.unpack(head)[0] > LONGEST_GREETING:
             raise ConnectionError
     except (OSError, ValueError) as error:
-        raise _no_answer(address, error) from error
+        raise _no_answer_error(address, error) from error
 
 
 def _check_workers(client, workers):
@@ -153,8 +153,8 @@ def _check_workers(client, workers):
     try:
         client.wait_for_workers(1, timeout=CONNECT_S if isinstance(workers, str) else ALONE_S)
     except TimeoutError as error:
-        raise _no_workers() from error
-    for worker, version in client.run(_version, on_error="return").items():
+        raise _no_workers_error() from error
+    for worker, version in client.run(_read_version, on_error="return").items():
         if version != tankcal.__version__:
             raise refusal(
                 message(
@@ -186,7 +186,7 @@ class Watch:
             return count
         self._alone_since = self._alone_since or time.monotonic()
         if time.monotonic() - self._alone_since > ALONE_S:
-            raise _no_workers()
+            raise _no_workers_error()
         return count
 
 
@@ -208,11 +208,13 @@ def failures_told():
         ) from error
 
 
-def _version():
+def _read_version():
+    """Version of tankcal on a worker."""
     return tankcal.__version__
 
 
-def _no_answer(address, error):
+def _no_answer_error(address, error):
+    """InputError for an address without an answer."""
     return refusal(
         message(
             "cluster_no_answer",
@@ -224,7 +226,8 @@ def _no_answer(address, error):
     )
 
 
-def _no_workers():
+def _no_workers_error():
+    """InputError for a cluster without workers."""
     return refusal(
         message(
             "cluster_no_workers",

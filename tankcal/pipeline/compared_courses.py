@@ -40,8 +40,8 @@ def exchanged_courses(outside_m, plates_m, candidates):
     if len(candidates) < 2:
         return None
     inside = outside_m - plates_m
-    steps = float(_steps(inside))
-    sums, pairs = _steps_exchanged(outside_m, plates_m, candidates)
+    steps = float(_sum_steps(inside))
+    sums, pairs = _sum_steps_exchanged(outside_m, plates_m, candidates)
     best = int(np.argmin(sums))
     if sums[best] >= EXCHANGED_SHARE * steps or steps - sums[best] <= EXCHANGED_M:
         return None
@@ -49,24 +49,24 @@ def exchanged_courses(outside_m, plates_m, candidates):
     # Simulated shells have the scatter of the inside radii; their best exchange shows what chance
     # achieves.
     shares = np.min(
-        _steps_exchanged(simulated + plates_m, plates_m, candidates)[0], axis=-1
-    ) / _steps(simulated)
+        _sum_steps_exchanged(simulated + plates_m, plates_m, candidates)[0], axis=-1
+    ) / _sum_steps(simulated)
     if np.mean(shares <= sums[best] / steps) > BY_CHANCE:
         return None
     return *pairs[best], float(sums[best]), steps
 
 
-def _steps_exchanged(outside_m, plates_m, candidates):
+def _sum_steps_exchanged(outside_m, plates_m, candidates):
     """Sums of steps (..., k) after the exchange of each of k pairs of courses, and the pairs."""
     pairs, sums = list(combinations(candidates, 2)), []
     for i, k in pairs:
         exchanged = outside_m.copy()
         exchanged[..., [i, k]] = outside_m[..., [k, i]]
-        sums.append(_steps(exchanged - plates_m))
+        sums.append(_sum_steps(exchanged - plates_m))
     return np.stack(sums, axis=-1), pairs
 
 
-def _steps(radii_m):
+def _sum_steps(radii_m):
     """Sum (...) of the steps between neighbouring courses, for radii (..., courses)."""
     return np.abs(np.diff(radii_m, axis=-1)).sum(axis=-1)
 

@@ -62,16 +62,17 @@ def corrections_of(job, survey, over_m=0.0):
     tuple of Correction
     """
     job = as_declared(job)
-    switches, volume = NONE, _at_top(job, survey, NONE, over_m)
+    switches, volume = NONE, _volume_at_top(job, survey, NONE, over_m)
     corrections = []
     reference = volume
     for code, is_relevant, formula, source in _applicable_corrections(job, survey):
         if not is_relevant:
             continue
         if code == "tilt":
-            corrections.append(_tilt(job, survey, reference, formula, source))
+            corrections.append(_tilt_correction(job, survey, reference, formula, source))
             continue
-        corrected = _at_top(job, survey, replace(switches, **{code: True}), over_m)
+        corrected = _volume_at_top(job, survey, replace(switches, **{code: True}), over_m)
+        # A correction switched off leaves the volume for the next corrections unchanged.
         size = corrected - volume
         is_applied = getattr(job.switches, code)
         if is_applied:
@@ -106,17 +107,30 @@ def correction_by_liquid(corrections, gross_m3, top_m3):
 
 
 def gross_at_top(job, survey, over_m=0.0):
-    """Return the volume at the top row without any correction, m3."""
-    return _at_top(job, survey, NONE, over_m)
+    """Return the volume at the top row without any correction, m3.
+
+    Parameters
+    ----------
+    job : Job
+    survey : object
+        Survey of the job.
+    over_m : float
+        Height of the top row above the top of the tank, m.
+
+    Returns
+    -------
+    float
+    """
+    return _volume_at_top(job, survey, NONE, over_m)
 
 
-def _at_top(job, survey, switches, over_m):
+def _volume_at_top(job, survey, switches, over_m):
     """Volume at the top row with given switches, m3."""
     body = body_of(job, survey, switches, uncertain=False)
     return float(body.volume_m3(np.array([body.highest_m + over_m]))[0])
 
 
-def _tilt(job, wall, volume, formula, source):
+def _tilt_correction(job, wall, volume, formula, source):
     """Correction by tilt: horizontal sections against sections square to the axis."""
     share = float(1 - 1 / np.hypot(1.0, wall.shell.tilt))
     return Correction("tilt", job.switches.tilt, volume * share, 100 * share, formula, source)
@@ -156,6 +170,7 @@ def _length_corrections(job):
 
 
 def _thermal_formula(job):
+    """Formula of the correction by shell temperature."""
     scale = thermal_scale(job, Switches())
     if job.table.height_expansion or not job.courses:
         template = "all lengths times 1 + α (T_ref − T_shell) = {scale:.8f}"
@@ -250,6 +265,7 @@ TOP_FORMULA = message("head_on_top", "volume of the head over the area of the la
 
 
 def _roof_formula(roof):
+    """Formula of the correction by a floating roof; "" without a roof."""
     if roof is None:
         return ""
     if roof.weighing == "vacuum":

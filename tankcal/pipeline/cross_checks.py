@@ -80,8 +80,8 @@ def check_scan(job, scan, top_m):
         )
         problems.append(Problem(origin_of(job.points), text))
     elif given_sd_m(job.points) is not None and not job.points.from_adjustment:
-        given = given_sd_m(job.points)
-        if scan.noise_m > MISFIT_SDS * given:
+        declared_sd_m = given_sd_m(job.points)
+        if scan.noise_m > MISFIT_SDS * declared_sd_m:
             text = message(
                 "points_beyond_sd",
                 "the points scatter by {noise_mm:.1f} mm (rms) about the best shape of"
@@ -89,7 +89,7 @@ def check_scan(job, scan, top_m):
                 " small, or is it another shape?",
                 noise_mm=1000 * scan.noise_m,
                 diameter_m=diameter,
-                given_mm=1000 * given,
+                given_mm=1000 * declared_sd_m,
             )
             problems.append(Problem(origin_of(job.points), text))
     return [*problems, *_check_foot(job, scan), *_check_reference(job, top_m)]

@@ -83,7 +83,9 @@ def _check_control(job):
     targets = repeats_of(job.hits.control)
     factor = repeat_factor(sum(3 * len(target.rows) for target in targets))
     for target in targets:
-        distance_spread, angle_spread = (factor * sd for sd in _sds_of(job.hits, target.setup))
+        distance_spread, angle_spread = (
+            factor * sd for sd in _standard_deviations(job.hits, target.setup)
+        )
         # Below the spread due to the declared standard deviations, chance would exceed the limit.
         angle = max(limits["control_angle_gon"] * GON, angle_spread)
         distance = max(limits["control_distance_mm"] / 1000, distance_spread)
@@ -131,7 +133,7 @@ def _check_assumed_places(job, wall, poses):
         yield Problem("control.csv", text, column="x_m")
 
 
-def _sds_of(hits, setup):
+def _standard_deviations(hits, setup):
     """Standard deviations of a distance (m) and of an angle (rad) of a set-up; 0 without hits."""
     is_of_setup = np.array(hits.setup) == setup
     return [
@@ -286,7 +288,7 @@ def _length_in_words(by_mm):
     return message("mm_too_long", "{by_mm:.1f} mm too long", by_mm=by_mm)
 
 
-def causes_unlike_certificates(wall, told, file="instruments.toml", *, taken_off_m):
+def causes_unlike_certificates(wall, estimates, file="instruments.toml", *, taken_off_m):
     """Warn of offsets and scales that differ from their certificates, according to the wall.
 
     The wall controls them only with straps, or with hits from both sides.
@@ -294,7 +296,7 @@ def causes_unlike_certificates(wall, told, file="instruments.toml", *, taken_off
     Parameters
     ----------
     wall : Wall
-    told : sequence of ToldCause
+    estimates : sequence of ToldCause
     file : str
         File of the certificates.
     taken_off_m : dict
@@ -304,9 +306,9 @@ def causes_unlike_certificates(wall, told, file="instruments.toml", *, taken_off
     ------
     Problem
     """
-    if not told or (wall.straps is None and not wall.by_inputs):
+    if not estimates or (wall.straps is None and not wall.by_inputs):
         return
-    for cause in told:
+    for cause in estimates:
         if not np.isfinite(cause.u_before) and cause.what == "instrument_offset":
             yield from _strange_offset(cause, taken_off_m.get(cause.name, 0.0), file)
         if not np.isfinite(cause.u_before) or abs(cause.value) <= UNLIKE_SDS * cause.u_before:

@@ -177,6 +177,7 @@ def _refuse_stations_outside(job):
 
 
 def _wrong_side_error(job):
+    """InputError for set-ups on the other side of the wall."""
     text = message(
         "hits_on_other_side",
         "found {side}, but all set-ups of the hits stand {other} the tank; expected {other}",

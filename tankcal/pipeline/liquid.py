@@ -90,7 +90,7 @@ class Measured:
 
     def result(self, levels_m):
         """Return the `LiquidResult` at the rows of a table."""
-        return _result(self, np.asarray(levels_m, dtype=float))
+        return _compute_result(self, np.asarray(levels_m, dtype=float))
 
 
 def measure_by_liquid(job, survey):
@@ -139,12 +139,12 @@ def _require_convergence(adjustment):
     )
 
 
-def _result(measured, levels):
+def _compute_result(measured, levels):
     """`LiquidResult` of a measured tank at given levels."""
     job, adjustment = measured.job, measured.joint
     adjusted, run_effect = adjustment.adjusted, adjustment.run_effect
-    tables = _tables(measured, levels)
-    causes = _with_reliability(
+    tables = _compute_tables(measured, levels)
+    causes = _add_reliability(
         measured, name_causes(adjusted, alternatives_of(adjustment)), tables, levels
     )
     radius_verdict = next((verdict for verdict in causes if verdict.cause.kind == "radii"), None)
@@ -155,16 +155,16 @@ def _result(measured, levels):
     )
     return LiquidResult(
         certified=job.liquid.certified,
-        steps=_steps(adjustment),
-        dips=_dips(adjustment),
-        checks=_checks(adjustment),
-        runs=_runs(adjustment),
+        steps=_list_steps(adjustment),
+        dips=_list_dips(adjustment),
+        checks=_compare_dips(adjustment),
+        runs=_estimate_runs(adjustment),
         run_sd=run_effect.sd,
         run_dof=run_effect.dof,
-        factors=_factors(adjustment),
+        factors=_estimate_factors(adjustment),
         bottom_flex=_estimate_of_effect(adjustment, FLEX, adjustment.known.flex_sd),
         bottom_m3=_estimate_of_effect(adjustment, BOTTOM, 1.0, is_free=True),
-        sizes=_sizes(adjustment),
+        sizes=_estimate_sizes(adjustment),
         chi2=adjusted.chi2,
         dof=adjusted.dof,
         probability=float(gammaincc(adjusted.dof / 2, adjusted.chi2 / 2)) if adjusted.dof else 1.0,
@@ -175,7 +175,7 @@ def _result(measured, levels):
     )
 
 
-def _with_reliability(measured, causes, tables, levels):
+def _add_reliability(measured, causes, tables, levels):
     """Add `undetected_U` to each `Verdict`: effect of an undetectable error on the table, in U."""
     basis = measured.job.liquid.certified
     if basis == "geometry":  # readings of the liquid do not change this table
@@ -196,7 +196,7 @@ def _with_reliability(measured, causes, tables, levels):
     return tuple(replace(verdict, undetected_U=undetected(verdict)) for verdict in causes)
 
 
-def _tables(measured, levels):
+def _compute_tables(measured, levels):
     """Tables by geometry, by liquid alone and by both."""
     job, probability = measured.job, measured.job.table.coverage_probability
     low, high = filled_range_m(job.liquid)
@@ -214,7 +214,7 @@ def _tables(measured, levels):
     }
 
 
-def _steps(adjustment):
+def _list_steps(adjustment):
     """`LiquidSteps` of an adjustment."""
     metering, fill, before = (
         adjustment.known.geometry.job.liquid,
@@ -223,7 +223,7 @@ def _steps(adjustment):
     )
     rows = metering.row[fill.dip_row]
     dips = metering.dip_m[fill.dip_row]
-    by_head = _by_head(adjustment)
+    by_head = _head_corrections(adjustment)
     sd = batch_sd_m3(metering, fill)
     # An error of one batch changes its own misclosure only: the column of a unit vector.
     error, sd_of_error, w = adjustment.adjusted.test(-np.eye(len(fill)))
@@ -252,14 +252,14 @@ def _steps(adjustment):
     )
 
 
-def _by_head(adjustment):
+def _head_corrections(adjustment):
     """Change (n,) of the increments by geometry, from the calibrating liquid to the table's."""
     geometry, fill = adjustment.known.geometry, adjustment.fill
     volumes = geometry.body().volume_m3(adjustment.loaded.level_m)
     return fill.differences() @ (volumes - adjustment.loaded.volume_m3)
 
 
-def _dips(adjustment):
+def _list_dips(adjustment):
     """`LiquidDips` of an adjustment."""
     metering, fill = adjustment.known.geometry.job.liquid, adjustment.fill
     rows = fill.dip_row
@@ -282,7 +282,7 @@ def _dips(adjustment):
     )
 
 
-def _checks(adjustment):
+def _compare_dips(adjustment):
     """`LiquidChecks` of dips that are only compared.
 
     A dip without weight in an adjustment gets the residual it would have as a check.
@@ -319,7 +319,7 @@ def _checks(adjustment):
     )
 
 
-def _runs(adjustment):
+def _estimate_runs(adjustment):
     """Estimates of the effects of the runs, relative."""
     place, run_effect = adjustment.adjusted.place(RUNS), adjustment.run_effect
     if place.stop == place.start:
@@ -331,7 +331,7 @@ def _runs(adjustment):
     )
 
 
-def _factors(adjustment):
+def _estimate_factors(adjustment):
     """Estimates of the meter factors."""
     metering, place = (
         adjustment.known.geometry.job.liquid,
@@ -363,7 +363,7 @@ def _estimate_of_effect(adjustment, kind, u, *, is_free=False):
     return Estimate(kind, 0.0, np.inf if is_free else u, float(u * z), float(u * sd))
 
 
-def _sizes(adjustment):
+def _estimate_sizes(adjustment):
     """Estimates of moved inputs, with their standard uncertainties."""
     adjusted, estimates = adjustment.adjusted, []
     columns = adjusted.effects[0].columns

@@ -260,7 +260,7 @@ def adjusted_at(geometry, fill, run_effect, corrections_m=None):
     adjusted = adjust_steps(misclosure, readings.noise, effects)
     columns = [one.columns for one in (*readings.noise, *effects) if not one.is_free]
     return LiquidFound(
-        known=_known(
+        known=_results_for_body(
             geometry, (loaded, sources, moved_inputs), adjusted, (metering, fill, run_result)
         ),
         fill=fill,
@@ -326,7 +326,7 @@ def _run_effect(metering, misclosure, readings, effects):
     return estimated
 
 
-def _known(geometry, geometry_parts, adjusted, liquid_parts):
+def _results_for_body(geometry, geometry_parts, adjusted, liquid_parts):
     """`Known` of an adjustment, sufficient to compute any row."""
     loaded, sources, moved_inputs = geometry_parts
     metering, fill, run = liquid_parts

@@ -172,6 +172,7 @@ class JointBody(Body):
         levels, known = np.asarray(levels_m, dtype=float), self.known
         if of_geometry is None:
             of_geometry = self._of_geometry(self.plain, levels)
+        # Sum of the effects of the estimates: geometry, volume below the first dip, and flexing.
         by_y = stacked(of_geometry, len(levels)) @ known.gain
         by_y = by_y + np.outer(known.share(levels), _gain_or_zeros(known.bottom_gain, by_y))
         return by_y + np.outer(self._head_m(levels), _gain_or_zeros(known.flex_gain, by_y))

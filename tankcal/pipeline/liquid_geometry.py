@@ -154,6 +154,7 @@ def load_geometry(geometry, densities_kg_m3, dips_m, shell_c):
     derivatives = body.derivatives(levels)
     zeros = np.zeros(len(levels))
     by_density = derivatives.get("liquid_density", zeros)
+    # The head of the liquid depends on its density at each dip: linear correction.
     volume = volume + by_density * (at_dips - declared)
     area = body.area_m2(levels)
     return Loaded(
@@ -161,14 +162,26 @@ def load_geometry(geometry, densities_kg_m3, dips_m, shell_c):
         volume_m3=volume,
         area_m2=area,
         by_density=by_density,
-        by_offset=_by_offset(body, derivatives, zeros),
-        growth=_growth(geometry.job, body, levels, shell_c),
+        by_offset=_offset_derivatives(body, derivatives, zeros),
+        growth=_thermal_growth(geometry.job, body, levels, shell_c),
         sources=sources_at(geometry, body, levels, without=("liquid_density",)),
     )
 
 
 def volumes_at(body, levels_m, shift_m):
-    """Return the volumes (rows,) at given levels, with the zero of the table moved by shift_m."""
+    """Return the volumes at given levels with the zero of the table moved.
+
+    Parameters
+    ----------
+    body : Body
+    levels_m : ndarray, shape (rows,)
+    shift_m : float
+        Move of the zero, m.
+
+    Returns
+    -------
+    ndarray, shape (rows,)
+    """
     if shift_m:
         return body.moved_m3(levels_m, shift_m)
     return body.volume_m3(np.clip(levels_m, body.lowest_m, None))
@@ -192,7 +205,7 @@ def sources_at(geometry, body, levels_m, without=()):
     return body.sources_by(levels_m, [declared.name for declared in geometry.job.inputs], without)
 
 
-def _by_offset(body, derivatives, zeros):
+def _offset_derivatives(body, derivatives, zeros):
     """Derivative of the volumes by an offset of all inside radii, m3/m."""
     if body.shell is not None:
         # A scale changes a radius r by r times the scale: divide by the mean radius.
@@ -208,7 +221,7 @@ def _mean_radius(body):
     return float(np.sqrt(np.mean(areas) / np.pi)) / body.shell.scale
 
 
-def _growth(job, body, levels_m, shell_c):
+def _thermal_growth(job, body, levels_m, shell_c):
     """Factor of the volumes due to the temperature of the shell, at a fixed level."""
     reference_c, expansion = job.table.reference_temperature_c, job.material.expansion_per_k
     temperature_c = np.where(np.isfinite(shell_c), shell_c, reference_c)
@@ -276,7 +289,22 @@ def column_of(sources, place):
 
 
 def wide_input(name, u, unit, as_read):
-    """Return a `DeclaredInput` with a wide uncertainty, for an unknown value."""
+    """Return a `DeclaredInput` with a wide uncertainty, for an unknown value.
+
+    Parameters
+    ----------
+    name : str
+    u : float
+        Standard uncertainty, SI.
+    unit : str
+        Unit for reports.
+    as_read : float
+        Standard uncertainty in this unit.
+
+    Returns
+    -------
+    DeclaredInput
+    """
     return DeclaredInput(name, u, unit, as_read, is_default=True)
 
 

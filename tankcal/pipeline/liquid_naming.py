@@ -31,7 +31,7 @@ def alternatives_of(adjustment):
     area = over * loaded.area_m2
     causes = [
         Alternative("meter", column, name, most=MOST_FACTOR)
-        for name, column in zip(fill.meters, _by_meter(metering, fill, reduced), strict=True)
+        for name, column in zip(fill.meters, _meter_columns(metering, fill, reduced), strict=True)
     ]
     length = {"unit": "m", "most": MOST_LENGTH_M}
     causes.append(Alternative("radii", over @ loaded.by_offset, **length))
@@ -50,7 +50,7 @@ def alternatives_of(adjustment):
     )
 
 
-def _by_meter(metering, fill, reduced):
+def _meter_columns(metering, fill, reduced):
     """Effect (n,) of each meter factor on the misclosures."""
     meters = np.array(metering.meter)
     return [-reduced.by_row_m3[:, meters == name].sum(axis=1) for name in fill.meters]
@@ -61,7 +61,7 @@ def _leak_causes(metering, fill):
 
     The rate is in m3/h if all rows have times, otherwise in m3 per step.
     """
-    hours = _hours(metering, fill)
+    hours = _step_hours(metering, fill)
     leaks = [Alternative("leak", hours, None, "m3/h" if _is_timed(metering) else "m3")]
     if len(fill.runs) > 1:
         leaks += [
@@ -76,7 +76,7 @@ def _is_timed(metering):
     return all(time is not None for time in metering.time)
 
 
-def _hours(metering, fill):
+def _step_hours(metering, fill):
     """Duration of each step, h, shape (n,); 1 without times."""
     if not _is_timed(metering):
         return np.ones(len(fill))

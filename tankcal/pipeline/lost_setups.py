@@ -45,10 +45,10 @@ def check_lost_setups(job, wall, sighting):
         count, total = int((is_of_setup & is_rejected).sum()), int(is_of_setup.sum())
         if count < max(FEWEST, MANY * total):
             continue
-        distance_off, pose_and_zero = _distance_off(
+        distance_off, pose_and_zero = _make_distance(
             job.hits, sighting, used[is_of_setup & is_rejected], used[~is_rejected]
         )
-        cause = _cause(job.hits, sighting, distance_off, pose_and_zero, name)
+        cause = _find_cause(job.hits, sighting, distance_off, pose_and_zero, name)
         if distance_off(*pose_and_zero) < OFF_M or (cause is None and count < MOST * total):
             continue
         text = message(
@@ -69,7 +69,7 @@ def check_lost_setups(job, wall, sighting):
         )
 
 
-def _distance_off(hits, sighting, rejected, accepted):
+def _make_distance(hits, sighting, rejected, accepted):
     """Function for the distance of the rejected hits of a set-up, and its present arguments.
 
     Parameters
@@ -101,7 +101,7 @@ def _distance_off(hits, sighting, rejected, accepted):
     return off, (pose, poses.orientation_rad[pose])
 
 
-def _cause(hits, sighting, distance_off, pose_and_zero, name):
+def _find_cause(hits, sighting, distance_off, pose_and_zero, name):
     """Cause that brings the hits to the wall, in words, or None."""
     pose, zero = pose_and_zero
     largest_m = CLOSER * distance_off(pose, zero)
