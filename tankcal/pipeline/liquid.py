@@ -305,7 +305,7 @@ def _compare_dips(adjustment):
     deviates, redundancy, _ = repeated.adjusted.residuals(effect)
     is_check = compared[repeated.fill.dip_row]
     places = repeated.fill.dip_row[is_check]
-    # The residual contains the uncertainty of the predicted dip; that of the reading is added.
+    # The residual has the uncertainty of the predicted dip; add the uncertainty of the reading.
     sd_of_prediction = OF_NO_WEIGHT_M * np.sqrt(np.maximum(1 - redundancy[is_check], 0.0))
     sd = np.hypot(sd_of_prediction, metering.s_dip_m[places])
     difference = -OF_NO_WEIGHT_M * deviates[is_check]

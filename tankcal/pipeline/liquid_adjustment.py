@@ -78,7 +78,7 @@ class LiquidFound:
     before_sd_m3 : ndarray, shape (n,)
         Standard deviations of the misclosures of `before`.
     misfit : float
-        Chi-square with the sizes held at their present values, plus that of the sizes.
+        Chi-square of the misclosures with the sizes held, plus chi-square of the sizes.
     corrections_m : ndarray, shape (rows,)
         Corrections of the dips of all rows at which the geometry was computed; 0: as read.
     is_settled : bool
@@ -258,7 +258,7 @@ def adjusted_at(geometry, fill, run_effect, corrections_m=None):
     if run_result.sd > 0:
         effects.append(Effect(RUNS, readings.run_m3 * run_result.sd))
     adjusted = adjust_steps(misclosure, readings.noise, effects)
-    columns = [one.columns for one in (*readings.noise, *effects) if not one.is_free]
+    columns = [effect.columns for effect in (*readings.noise, *effects) if not effect.is_free]
     return LiquidFound(
         known=_results_for_body(
             geometry, (loaded, sources, moved_inputs), adjusted, (metering, fill, run_result)
@@ -277,7 +277,7 @@ def adjusted_at(geometry, fill, run_effect, corrections_m=None):
 
 
 def _misfit(adjusted, misclosure, sources, moved):
-    """Chi-square of misclosures (n,) with the moved inputs held, plus that of these inputs."""
+    """Chi-square of misclosures (n,) with the moved inputs held, plus their own chi-square."""
     if not moved:
         return adjusted.chi2
     held_columns = np.stack([column_of(sources, place) for place, _ in moved], axis=1)
