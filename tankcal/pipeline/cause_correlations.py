@@ -91,12 +91,12 @@ def told_causes(job, wall):
             covariance_m2 = field.covariance_m2 + noise - field.noise_m2
             precision = restricted_precision(covariance_m2, free_design(field.sites)[0])
         u = cause.u * IN_SI[cause.unit]
-        column = -(
-            wall.radii_by_points @ cause.column_m[coordinates]
-        )  # effect of distances too long by one u
+        # Effect of distances too long by one u.
+        column = -(wall.radii_by_points @ cause.column_m[coordinates])
         # Posterior variance of the cause; rounding must not make it zero or negative.
         variance = max(1 - column @ precision @ column, 1e-12)
         shift, u_after = u * (column @ precision @ deviations), u * np.sqrt(variance)
+        # The covariance with the radius is -A c.
         correlation = -(along @ column) / np.sqrt(variance) / u_radius
         estimates.append(
             ToldCause(

@@ -12,7 +12,7 @@ from tankcal.messages import message
 from tankcal.survey.beams import shared_by_beams
 
 REGISTRATION = "registration"  # kind of the causes that are poses
-STEP_M = 1.0  # step along the normal of a surface, for numerical differentiation
+STEP_M = 1.0  # step along the normal of a surface
 FEWEST_CELLS = 20  # smallest number of common cells for a comparison of two scans
 MOST_CELLS = 150  # largest number of compared cells of an overlap
 LEAST_M = 2e-4  # standard deviation of differences without a known cause, m

@@ -15,6 +15,7 @@ ISO_4269 = "ISO 4269:2001"
 TIMOSHENKO = "Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells"
 INSIDE_PLATE = message("inside_plate", "r_inside = r − t")
 INSIDE_PAINT = message("inside_paint", "r_inside = r − t − paint")
+# No correction, except tilt, which the surveyed sections include.
 NONE = Switches(**{field.name: field.name == "tilt" for field in fields(Switches)})
 
 

@@ -362,9 +362,8 @@ def _check_straps(job, wall, levels):
     for level in levels:
         rises.setdefault(level.course, []).append((level.level_m, level.rise_m))
     zeros = {}  # {course: [(radius at the reference level, strap)]}
-    for place, reading in zip(
-        wall.straps.adjusted, wall.readings, strict=False
-    ):  # the readings list straps first
+    # The readings list straps first.
+    for place, reading in zip(wall.straps.adjusted, wall.readings, strict=False):
         strap = wall.reduced[place].strap
         if strap.course in rises:
             nearest = min(rises[strap.course], key=lambda rise: abs(rise[0] - strap.level_m))
