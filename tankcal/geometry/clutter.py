@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.adjust import CRITICAL, Adjustment, adjust, snoop
+from tankcal.adjust import CRITICAL, SD_OVER_MEDIAN, Adjustment, adjust, snoop
 from tankcal.geometry.form import harmonics, mode_variances
 
 FITTED = 800  # approximate number of points in the fit of the form; at most twice as many
@@ -168,7 +168,7 @@ def _fit_form(xyz, course, uneven, axis, relative, slope_sd, accepted, previous_
 
     Helmert's simple iteration: each standard deviation is scaled by the square root of the sum of
     squared normalised residuals of its group over the redundancy of the group (Foerstner 1979). The
-    point noise is robust: it never exceeds 1.4826 times the median residual. Accepted points beyond
+    point noise is robust: it never exceeds SD_OVER_MEDIAN times the median residual. Accepted points beyond
     two standard deviations have less weight (Huber 1964), so that clutter does not distort the
     form.
     """
@@ -212,9 +212,7 @@ def _deletion_statistics(fit, residual, sd, noise):
 def _estimate_noise(residual, redundancy):
     """Return the point noise, m: root of squares over redundancy, at most the robust estimate."""
     classical = np.sqrt(np.sum(residual**2) / np.sum(redundancy))
-    # 1.4826 is the ratio of standard deviation to median absolute deviation of a normal
-    # distribution.
-    robust = 1.4826 * np.median(np.abs(residual) / np.sqrt(np.maximum(redundancy, 1e-9)))
+    robust = SD_OVER_MEDIAN * np.median(np.abs(residual) / np.sqrt(np.maximum(redundancy, 1e-9)))
     return max(min(classical, robust), LEAST_NOISE_M)
 
 
