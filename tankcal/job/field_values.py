@@ -160,7 +160,7 @@ def _float(raw):
 
 
 def _kind_of(raw):
-    """A value as found, with its kind where that is what is wrong with it."""
+    """Value as shown in a message, with its type if the type is wrong."""
     found = shown(raw)
     if isinstance(raw, bool):
         return message("the_truth_value", "the truth value {found}", found=found)
@@ -203,9 +203,9 @@ def _read_text(field, raw, _decimal):
     else:
         text = str(raw)
     if field.kind == "text":
-        sound = len(text) <= MAX_TEXT and all(_is_writing(char) for char in text)
+        is_valid = len(text) <= MAX_TEXT and all(_is_writing(char) for char in text)
     elif field.kind == "name":
-        sound = is_name(text)
+        is_valid = is_name(text)
     else:
         patterns = {
             "tank id": _TANK_ID,
@@ -214,8 +214,8 @@ def _read_text(field, raw, _decimal):
             "rule name": _RULE_NAME,
         }
         pattern = patterns[field.kind]
-        sound = len(text) <= MAX_NAME and pattern.fullmatch(text) is not None
-    if not sound:
+        is_valid = len(text) <= MAX_NAME and pattern.fullmatch(text) is not None
+    if not is_valid:
         raise _refused(field, shown(text))
     return meant(text, field.choices) or text
 

@@ -76,7 +76,7 @@ class Meaning:
 
 
 def meanings_of(headings, fields):
-    """{heading: Meaning} of each heading that matches exactly one column, and is the only one."""
+    """{heading: Meaning}; a heading and its column must match only each other."""
     names = {field.name: _names_of(field) for field in fields}
     meanings = {}
     for heading in headings:

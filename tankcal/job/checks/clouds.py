@@ -286,7 +286,7 @@ def _count_targets(targets, names, are_all_read, log):
     if not has_rows(targets):
         return {}
     known = [scan for scans in names.values() for scan in scans]
-    counts, seen = {}, {}
+    counts, first_rows = {}, {}
     columns = zip(targets.rows, targets.of("scan"), targets.of("target"), strict=True)
     for row, scan, target in columns:
         if scan is None or target is None:
@@ -301,10 +301,10 @@ def _count_targets(targets, names, are_all_read, log):
                 )
                 log.problem(targets.file, text, row, "scan")
             continue
-        if (scan, target) in seen:
-            log.problem(targets.file, name_twice(target, seen[scan, target]), row, "target")
+        if (scan, target) in first_rows:
+            log.problem(targets.file, name_twice(target, first_rows[scan, target]), row, "target")
             continue
-        seen[scan, target] = row
+        first_rows[scan, target] = row
         counts[scan] = counts.get(scan, 0) + 1
     return counts
 

@@ -242,8 +242,8 @@ def _check_tapes(straps, instruments, tapes, raw, log):
         certified = (
             given["master"] if given["master"] in tapes else name
         )  # tape whose certificate applies
-        found = [(name, *one) for one in _missing_of(given, tapes)]
-        found += [(certified, *one) for one in _missing_of_certificate(given, tapes[certified])]
+        found = [(name, *fault) for fault in _missing_of(given, tapes)]
+        found += [(certified, *fault) for fault in _missing_of_certificate(given, tapes[certified])]
         for owner, key, expected in found:
             where = rows.get(owner), f"{owner}.{key}"
             if not log.has(file, *where):  # report a master of two tapes once

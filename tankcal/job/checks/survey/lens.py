@@ -51,11 +51,7 @@ def check_convention(files, name, given, parameters):
     if files.is_given("cameras", name, "convention"):
         return
     lens = [parameter for parameter in parameters if parameter.name[0] in "KPAB"]
-    with_value = [
-        parameter_of_lens.key
-        for parameter_of_lens in lens
-        if parameter_of_lens.value and parameter_of_lens.name[0] in "KP"
-    ]
+    with_value = [term.key for term in lens if term.value and term.name[0] in "KP"]
     if with_value:
         expected = message(
             "convention_missing",
