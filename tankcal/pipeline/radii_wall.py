@@ -88,11 +88,11 @@ class RadiiWall:
     def covariance_m2(self):
         """(courses, courses) of the radii, without what declared inputs add."""
         nothing = np.zeros((len(self.radius_m), len(self.radius_m)))
-        return sum((one.columns @ one.columns.T for one in self.causes), start=nothing)
+        return sum((cause.columns @ cause.columns.T for cause in self.causes), start=nothing)
 
     def covariance_with(self, inputs):
         """(courses, courses) of the radii, with what declared inputs add, m2."""
-        known = {one.name: one.u for one in inputs}
+        known = {declared_input.name: declared_input.u for declared_input in inputs}
         found = self.covariance_m2
         for name, column in self.by_inputs.items():
             found = found + known.get(name, 0.0) ** 2 * np.outer(column, column)
@@ -104,7 +104,7 @@ class RadiiWall:
 
     def factors(self, job, weights):
         """`Factor`s of what the radii leave uncertain about features, (f, courses) by them."""
-        return tuple(one.mapped(lambda columns: weights @ columns) for one in self.causes)
+        return tuple(cause.mapped(lambda columns: weights @ columns) for cause in self.causes)
 
     def read_with(self, weights):
         """{input: (f,) derivative of features}: of what a survey of some courses depends on."""
@@ -119,7 +119,7 @@ def find_radii_wall(job, progress):
 
 def wall_of_radii(job, radius_m, causes, by_inputs=None):
     """`RadiiWall` of radii (courses,); causes and by_inputs as there."""
-    found = tuple(one for one in causes if np.any(one.columns))
+    found = tuple(cause for cause in causes if np.any(cause.columns))
     return RadiiWall(joints_of(job), shell_zero(job, None), radius_m, found, by_inputs or {})
 
 

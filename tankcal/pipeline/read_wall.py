@@ -73,7 +73,9 @@ class ReadWall:
             kappa = u^2 c' P y,   variance u^2 - u^4 c' P c.
         """
         found, used = {}, self.accepted
-        unknowns = columns_of([one.free for one in self.readings])  # the last of `Sites.shared`
+        unknowns = columns_of(
+            [reading.free for reading in self.readings]
+        )  # the last of `Sites.shared`
         for place, (kind, name) in enumerate(unknowns, start=-len(unknowns)):
             if kind == "collimation":
                 values, covariance = self.field.shared
@@ -85,7 +87,11 @@ class ReadWall:
             if precision is None:
                 design = free_design(self.field.sites)[0]
                 precision = restricted_precision(self.field.covariance_m2, design)
-            u = next(one.effects[kind, name][0] for one in used if (kind, name) in one.effects)
+            u = next(
+                reading.effects[kind, name][0]
+                for reading in used
+                if (kind, name) in reading.effects
+            )
             u, column = np.radians(u / 3600), np.pad(column, (points, 0))
             share = column @ precision @ column
             found[name] = (
@@ -96,4 +102,4 @@ class ReadWall:
 
     def are(self, kind):
         """(n,) which readings are of a kind."""
-        return np.array([one.of == kind for one in self.readings], dtype=bool)
+        return np.array([reading.of == kind for reading in self.readings], dtype=bool)

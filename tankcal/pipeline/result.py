@@ -158,10 +158,15 @@ class Result:
 
     def _repr_html_(self) -> str:
         rows = [
-            [one.code, "yes" if one.applied else "no", one.size_m3, one.size_percent]
-            for one in self.corrections
+            [
+                correction.code,
+                "yes" if correction.applied else "no",
+                correction.size_m3,
+                correction.size_percent,
+            ]
+            for correction in self.corrections
         ]
-        warnings = "".join(f"<li>{escape(str(one))}</li>" for one in self.warnings)
+        warnings = "".join(f"<li>{escape(str(warning))}</li>" for warning in self.warnings)
         return (
             f"<p><b>{escape(str(self))}</b></p>"
             + table_html("Corrections at the top", ["correction", "made", "m3", "%"], rows)

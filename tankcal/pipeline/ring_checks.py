@@ -108,7 +108,7 @@ def _of_laps(job, straps):
     thickness = np.array([ring.thickness_m for ring in job.rings])
     names = names_of(job.rings)
     if None not in laps and len(names) > 1:
-        outer = np.array([one == "outer" for one in laps])
+        outer = np.array([lap == "outer" for lap in laps])
         if _steps_of_laps(straps.radius_m - plates, thickness, outer) < -FITS:
             yield _problem(
                 message(
@@ -183,7 +183,7 @@ def exchanged_rings(outside_m, plates_m, thickness_m, laps):
         first = np.arange(count) % 2 == 0
         orders = [np.zeros(count, dtype=bool), first, ~first]
     else:
-        orders = [np.array([one == "outer" for one in laps])]
+        orders = [np.array([lap == "outer" for lap in laps])]
     shifts = [outer * _inner_plates(thickness_m, outer) for outer in orders]
     inside = outside_m - plates_m
     steps = [np.abs(np.diff(inside - shift)).sum() for shift in shifts]

@@ -39,7 +39,7 @@ class RingedWall(TapedWall):
     def radius_sd_m(self, factors):
         """(rings,) standard deviation of the mean radii by `RingFeatures.factors`."""
         rings = len(self.joints_m) - 1
-        return np.sqrt(sum(np.sum(one.columns[:rings] ** 2, axis=1) for one in factors))
+        return np.sqrt(sum(np.sum(factor.columns[:rings] ** 2, axis=1) for factor in factors))
 
     def features_at(self, dip_from_a_m):
         """`RingFeatures` of a tank that is dipped there."""
@@ -100,10 +100,12 @@ class RingFeatures:
     def _of_bulges(self):
         """A `Factor` of what the straps did not see of mean radii along the rings."""
         assumed = self._wall.field.amplitudes.assumed_share()
-        chosen = [i for i, one in enumerate(COMPONENTS) if one.shape == "mean"]
+        chosen = [i for i, component in enumerate(COMPONENTS) if component.shape == "mean"]
         turn = self._of_levels
         parts = [turn @ self._means.unseen(i) @ turn.T for i in chosen]
-        found = factor_of_unseen("bulge", parts, [np.trace(one) for one in parts], assumed[chosen])
+        found = factor_of_unseen(
+            "bulge", parts, [np.trace(part) for part in parts], assumed[chosen]
+        )
         return (self._padded(found),) if found.columns.shape[1] else ()
 
     def _of_waves(self):
@@ -146,9 +148,9 @@ class RingFeatures:
 def _shares_of_waves():
     """{(shape, common): share of the variance round a wall}, by the medians of the components."""
     sizes = {(shape, common): 0.0 for shape in KIND_OF_WAVES for common in (True, False)}
-    for one in COMPONENTS:
-        if one.shape in KIND_OF_WAVES:
-            sizes[one.shape, one.common] += one.median_m**2
+    for component in COMPONENTS:
+        if component.shape in KIND_OF_WAVES:
+            sizes[component.shape, component.common] += component.median_m**2
     whole = sum(sizes.values())
     return {key: size / whole for key, size in sizes.items()}
 
@@ -167,13 +169,13 @@ def find_ringed_wall(job, progress, amplitudes=None):
             rings=len(job.rings),
         )
     )
-    read = [one.reading_m for one in straps.straps]
+    read = [strap.reading_m for strap in straps.straps]
     nominal = float(np.median(read)) / (2 * np.pi)
     reduced = reduce_straps(straps, job.survey.shell_temperature_c, 2 * nominal)
-    places = [i for i, one in enumerate(reduced) if not one.strap.check]
+    places = [i for i, reduced_strap in enumerate(reduced) if not reduced_strap.strap.check]
     term = AreaTerm(*perimeter_excess(straps.shape_sd_m, nominal))
     readings = readings_of_straps([reduced[i] for i in places], names_of(job.rings), term)
-    joints = np.concatenate([[0.0], np.cumsum([one.length_m for one in job.rings])])
+    joints = np.concatenate([[0.0], np.cumsum([ring.length_m for ring in job.rings])])
     readings, tested, field = adjust_readings(
         readings,
         (joints, 0.0, nominal),

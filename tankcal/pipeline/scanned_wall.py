@@ -110,7 +110,7 @@ def scanned_wall(job, fitted, chosen, covariance_m2, dof):
     def of_points(part):
         weights = found.weights[part]
         covariance = amplitudes.noise * weights @ readings.noise_m2 @ weights.T
-        return survey_factors(covariance, dof, causes, [weights @ one for one in moves])
+        return survey_factors(covariance, dof, causes, [weights @ column for column in moves])
 
     factors = (*of_points(rows), *_of_the_unseen(field, found, rows))
     form = SurveyedForm.of_volumes(
@@ -172,13 +172,15 @@ def _of_the_unseen(field, found, rows):
     """A `Factor` of each kind of departure that the points did not see all of."""
     assumed, factors = field.amplitudes.assumed_share(), []
     for kind in KINDS:
-        chosen = [i for i, one in enumerate(field.places.departures) if one.kind == kind]
+        chosen = [
+            i for i, departure in enumerate(field.places.departures) if departure.kind == kind
+        ]
         if not chosen:
             continue
         parts = [found.unseen[i][rows, rows] for i in chosen]
-        sizes = [np.trace(one) for one in parts]
+        sizes = [np.trace(part) for part in parts]
         factors.append(factor_of_unseen(kind, parts, sizes, assumed[chosen]))
-    return tuple(one for one in factors if one.columns.shape[1])
+    return tuple(factor for factor in factors if factor.columns.shape[1])
 
 
 def _readings(job, fit, chosen, covariance_m2):

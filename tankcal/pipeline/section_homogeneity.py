@@ -79,7 +79,7 @@ class Homogeneity:
     @property
     def compared(self):
         """Sections that take part in Bartlett's test."""
-        return [one for one in self.sections if one.is_compared]
+        return [section for section in self.sections if section.is_compared]
 
 
 def homogeneity_of(job, wall):
@@ -107,7 +107,7 @@ def homogeneity_of(job, wall):
     ]
     differs = _rejected_by_holm(p) if is_stated else np.zeros(len(p), dtype=bool)
     tests = tuple(_test_of(*parts) for parts in zip(wall.sections, noise, p, differs, strict=True))
-    compared = [(one.factor, one.dof) for one in tests if one.is_compared]
+    compared = [(test.factor, test.dof) for test in tests if test.is_compared]
     if len(compared) < 2:
         return Homogeneity(tests)
     return Homogeneity(tests, *bartlett(*zip(*compared, strict=True)))
@@ -188,7 +188,7 @@ def warn_of_sections(job, wall):
                 loud=np.sqrt(loud.factor),
             )
         )
-    off = [one for one in found.sections if one.differs]
+    off = [section for section in found.sections if section.differs]
     if off:
         shown = [
             message(

@@ -93,16 +93,16 @@ class ShapeBase:
         at, angle, site = map(np.array, zip(*spots, strict=True))
         self._site = site
         sites = wall.field.sites
-        zeta = np.array([one.zeta for one in levels])[at]
+        zeta = np.array([level.zeta for level in levels])[at]
         spots = Spots(
-            course=np.array([one.course for one in levels])[at],
+            course=np.array([level.course for level in levels])[at],
             zeta=np.where(site >= 0, sites.zeta[site], zeta),
             azimuth_rad=np.where(site >= 0, sites.azimuth_rad[site], angle),
             site=site,
         )
         rings = [(levels[i].ring, levels[i].zeta) for i in plumbed]
         self._found = FieldValues(wall.field, spots, rings)
-        self._height_m = np.array([one.height_m for one in levels])[at]
+        self._height_m = np.array([level.height_m for level in levels])[at]
         inset = np.array(insets_of(job, job.switches))[spots.course]
         self._head_m, self.state = self._widening()
         self._surveyed = self._found.value_m.copy()
@@ -182,10 +182,10 @@ class ShapeBase:
         value = rows @ self._value_m
         value += rows[:, self._count :] @ self._origins()
         unseen = self._found.unseen_of(rows)
-        kinds = np.array([one.kind for one in COMPONENTS])
+        kinds = np.array([component.kind for component in COMPONENTS])
         variances = [unseen[kinds == kind].sum(axis=0) for kind in KINDS]
-        parts = [Source("", np.sqrt(np.maximum(one, 0.0))[:, None]) for one in variances]
-        by_survey = [one.mapped(lambda columns: rows @ columns) for one in self._sources]
+        parts = [Source("", np.sqrt(np.maximum(variance, 0.0))[:, None]) for variance in variances]
+        by_survey = [cause.mapped(lambda columns: rows @ columns) for cause in self._sources]
         told = combine([*by_survey, *parts], len(value))
         return Figures(value, np.maximum(told.u, LEAST_U_M), told.effective_dof)
 
@@ -203,11 +203,11 @@ class ShapeBase:
         factors = wall.factors(job, self._found.weights)
         by = self._derivatives()
         declared = {
-            one.name: declared_source(one, by[one.name])
-            for one in job.inputs
-            if one.name in by and one.name not in wall.without_inputs
+            declared_input.name: declared_source(declared_input, by[declared_input.name])
+            for declared_input in job.inputs
+            if declared_input.name in by and declared_input.name not in wall.without_inputs
         }
-        survey = [one.source(one.columns) for one in factors]
+        survey = [factor.source(factor.columns) for factor in factors]
         return [*survey, *group_correlated(declared, job.correlations)]
 
     def _derivatives(self):
@@ -232,7 +232,7 @@ class ShapeBase:
         if self.state == "as_found":
             return {}
         job, head = self._job, self._head_m
-        plate = np.array([one.thickness_m for one in job.courses])
+        plate = np.array([course.thickness_m for course in job.courses])
         course = np.searchsorted(self._wall.joints_m[1:-1], self._height_m, side="right")
         above = job.survey.liquid_level_m + job.datum.plate_level_m - self._height_m
         return {

@@ -127,7 +127,7 @@ def ship_tables(job, survey, body, table, progress=None):
     tangents = [
         (trim / ship.length_between_marks_m, tan(list_)) for trim in trims for list_ in lists
     ]
-    cells = [heeled_body(job, survey, *one) for one in tangents]
+    cells = [heeled_body(job, survey, *pair) for pair in tangents]
     soundings = _soundings(job, cells)
     solids, level = [cell.parts[0].solid for cell in cells], body.parts[0].solid
     found = corrections_of(solids, level, soundings, table.height_m[-1])
@@ -172,7 +172,7 @@ def _soundings(job, cells):
     highest = min(max(cell.highest_m for cell in cells), length)
     step = ship.correction_step_m
     if step is None:
-        step = next((one for one in STEPS_M if highest / one <= ABOUT), STEPS_M[-1])
+        step = next((step_m for step_m in STEPS_M if highest / step_m <= ABOUT), STEPS_M[-1])
     count = ceil(highest / step - 1e-9) + 1
     if count * len(cells) > MOST:
         expected = message(

@@ -16,7 +16,7 @@ def check_bases(measurements):
     """`Problem`s of the bases that stadias were read over."""
     if measurements is None:
         return ()
-    bars = {one.name for one in measurements.instruments if one.kind == KIND}
+    bars = {instrument.name for instrument in measurements.instruments if instrument.kind == KIND}
     bases = {}
     for table in measurements.readings:
         if table.table != "distances":
@@ -41,7 +41,7 @@ def check_rejected_bases(measurements, readings):
     readings : Readings
         Of their adjustment.
     """
-    bars = {one.name for one in measurements.instruments if one.kind == KIND}
+    bars = {instrument.name for instrument in measurements.instruments if instrument.kind == KIND}
     bases = {
         (table.file, row)
         for table in measurements.readings

@@ -30,7 +30,9 @@ class Statements:
     @property
     def pairs(self):
         """((low_m, high_m), ...) of the deliveries."""
-        return tuple((one.low_m, one.high_m) for one in self.deliveries)
+        return tuple(
+            (stated_delivery.low_m, stated_delivery.high_m) for stated_delivery in self.deliveries
+        )
 
 
 def statements(job, table, largest_interpolation_m3):
@@ -57,9 +59,15 @@ def statements(job, table, largest_interpolation_m3):
     """
     _refuse_outside(job.stated, table)
     reading = reading_sources(job.inputs, largest_interpolation_m3)
-    dips = [one.high_m for one in job.stated if one.low_m is None] or _quarters(table)
+    dips = [
+        stated_delivery.high_m for stated_delivery in job.stated if stated_delivery.low_m is None
+    ] or _quarters(table)
     worst = _worst(job, table)
-    pairs = [(one.low_m, one.high_m) for one in job.stated if one.low_m is not None]
+    pairs = [
+        (stated_delivery.low_m, stated_delivery.high_m)
+        for stated_delivery in job.stated
+        if stated_delivery.low_m is not None
+    ]
     pairs += [(one.at_minimum.low_m, one.at_minimum.high_m) for one in worst if one.at_minimum]
     return Statements(
         volumes=tuple(budget(table, dip, reading=reading) for dip in dips),
@@ -193,7 +201,7 @@ def _refuse_outside(stated, table):
     top = max(round(table.height_m[-1], 3), table.height_m[-1])
     problems = [
         Problem(
-            one.file,
+            stated_delivery.file,
             message(
                 "stated_outside_table",
                 "found {dip:g}; expected {low:g} to {top:g}, the dips of the table",
@@ -201,11 +209,11 @@ def _refuse_outside(stated, table):
                 low=table.height_m[0],
                 top=top,
             ),
-            one.row,
+            stated_delivery.row,
             column,
         )
-        for one in stated
-        for column, dip in (("low_m", one.low_m), ("high_m", one.high_m))
+        for stated_delivery in stated
+        for column, dip in (("low_m", stated_delivery.low_m), ("high_m", stated_delivery.high_m))
         if dip is not None and not table.height_m[0] <= dip <= top
     ]
     if problems:
@@ -227,9 +235,9 @@ def _quarters(table):
 def _stated(job):
     """The volumes that an earlier table or a contract states."""
     return tuple(
-        StatedVolume(one.volume_m3, one.high_m, one.low_m)
-        for one in job.stated
-        if one.volume_m3 is not None
+        StatedVolume(stated_delivery.volume_m3, stated_delivery.high_m, stated_delivery.low_m)
+        for stated_delivery in job.stated
+        if stated_delivery.volume_m3 is not None
     )
 
 

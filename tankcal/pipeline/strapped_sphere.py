@@ -146,7 +146,7 @@ class StrappedSphere:
     def _beyond(self, solid, levels, weights):
         """A `Factor` of each kind of departure beyond degree 2."""
         volumes = cap_volumes(levels, solid.area_m2(levels), solid.top_m / 2)
-        for kind in dict.fromkeys(one.kind for one in self.places.departures):
+        for kind in dict.fromkeys(departure.kind for departure in self.places.departures):
             whole = 0.0
             for size, part, one in zip(
                 self.variances_m2, self._parts, self.places.departures, strict=True
@@ -176,16 +176,18 @@ def find_strapped_sphere(job, progress):
             count=len(given.strapping.straps),
         )
     )
-    radius = float(np.median([one.reading_m for one in given.strapping.straps])) / FULL_TURN
+    radius = float(np.median([strap.reading_m for strap in given.strapping.straps])) / FULL_TURN
     reduced = reduce_straps(given.strapping, job.survey.shell_temperature_c, 2 * radius)
-    azimuth = given.azimuths([one.strap for one in reduced])
-    adjusted = np.array([i for i, one in enumerate(reduced) if not one.strap.check])
+    azimuth = given.azimuths([reduced_strap.strap for reduced_strap in reduced])
+    adjusted = np.array(
+        [i for i, reduced_strap in enumerate(reduced) if not reduced_strap.strap.check]
+    )
     readings = tuple(readings_of_straps([reduced[i] for i in adjusted], KINDS, NO_AREA_TERM))
     places = OnGreatCircles(radius, _normals(azimuth[adjusted]))
     variances = _assumed_variances(places.departures, job.sphere.form_m)
     size = job.sphere.ovality_m or OVALITY_SHARE * radius
     prior = FormPrior(size, size)
-    lengths = FULL_TURN * np.array([one.radius_m for one in readings])
+    lengths = FULL_TURN * np.array([reading.radius_m for reading in readings])
     whole = FULL_TURN**2 * (noise_of(readings) + _parts(places, variances).sum(axis=0))
     fit = fit_ellipsoid(azimuth[adjusted], lengths, whole, prior)
     return StrappedSphere(

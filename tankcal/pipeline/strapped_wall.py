@@ -109,7 +109,7 @@ class TapedWall(ReadWall):
     def factors(self, job, weights):
         """`Factor`s of what the readings leave uncertain about features, (f, n) by their radii."""
         used, names = self.accepted, names_of(job.courses or job.rings)
-        sees = 1 - np.array([one.by_inputs.get("plate_thickness", 0.0) for one in used])
+        sees = 1 - np.array([reading.by_inputs.get("plate_thickness", 0.0) for reading in used])
         plates = factors_of_plates(names, self.field, weights * sees, self.plate_sd_m)
         return (*factors_of_readings(used, weights), *plates)
 
@@ -146,9 +146,9 @@ def find_strapped_wall(job, progress, amplitudes=None):
             count=len(straps.straps),
         )
     )
-    nominal, courses = job.tank.nominal_diameter_m / 2, [one.name for one in job.courses]
+    nominal, courses = job.tank.nominal_diameter_m / 2, [course.name for course in job.courses]
     reduced = reduce_straps(straps, job.survey.shell_temperature_c, 2 * nominal)
-    places = [i for i, one in enumerate(reduced) if not one.strap.check]
+    places = [i for i, reduced_strap in enumerate(reduced) if not reduced_strap.strap.check]
     shape_m = typical_shape_m() if straps.shape_sd_m is None else straps.shape_sd_m
     term = AreaTerm(*perimeter_excess(shape_m, nominal))
     joints, zero = joints_of(job), shell_zero(job, None)
@@ -162,7 +162,7 @@ def find_strapped_wall(job, progress, amplitudes=None):
                 lines=len(lines.lines),
             )
         )
-        kept = [i for i, one in enumerate(lines.offsets) if not one.check]
+        kept = [i for i, offset in enumerate(lines.offsets) if not offset.check]
         used = [lines.offsets[i] for i in kept]
         insets = insets_of(job, job.switches)
         readings += readings_of_offsets(lines, used, courses, insets)
@@ -198,7 +198,7 @@ def adjust_readings(readings, sizes, amplitudes, *, snooping, bulge_scale=1.0):
     noise = noise_of(readings)
     if amplitudes is not None:
         amplitudes = amplitudes.with_bulges(bulge_scale)
-    may_go = snooping * np.array([one.of == "offsets" for one in readings])
+    may_go = snooping * np.array([reading.of == "offsets" for reading in readings])
 
     def field_of(accepted):
         some = np.flatnonzero(accepted)
@@ -210,7 +210,7 @@ def adjust_readings(readings, sizes, amplitudes, *, snooping, bulge_scale=1.0):
     if np.any(sites.ring >= 0):
         readings = off_centre(readings, field)
         field = field_of(accepted)
-    radius = np.array([one.radius_m for one in readings])
+    radius = np.array([reading.radius_m for reading in readings])
     field, tested = settle_readings(field, field_of, (sites, radius, noise), may_go)
     return readings, tested, field
 
@@ -220,8 +220,8 @@ def field_of_readings(sites, readings, noise_m2, nominal_m, amplitudes=None):
 
     amplitudes  None: those that the readings tell
     """
-    radius = np.array([one.radius_m for one in readings])
-    by_lines = any(one.of == "offsets" for one in readings)
+    radius = np.array([reading.radius_m for reading in readings])
+    by_lines = any(reading.of == "offsets" for reading in readings)
     stated = STATED_BY_LINES if by_lines else STATED_BY_STRAPS
     try:
         if amplitudes is None:

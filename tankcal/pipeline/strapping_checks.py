@@ -145,8 +145,8 @@ def _problem(text, strap=None, column="reading_m"):
 def check_repeats(straps, table="repeats"):
     """`Problem`s of repeats that differ by more than they may; table as in `limit_of_repeats`."""
     by_name = {}
-    for one in straps.reduced:
-        by_name.setdefault(one.strap.name, []).append(one)
+    for reduced_strap in straps.reduced:
+        by_name.setdefault(reduced_strap.strap.name, []).append(reduced_strap)
     for name, several in by_name.items():
         if len(several) < 2:
             continue
@@ -235,7 +235,7 @@ def _of_courses(job, straps):
             text = message("courses_short_by_plates", template, miss_mm=miss)
         yield _problem(text)
     share = limits_of("nominal_size")["share"] * nominal
-    strapped = {one.strap.course for one in straps.reduced}
+    strapped = {reduced_strap.strap.course for reduced_strap in straps.reduced}
     both = [i for i, name in enumerate(names) if name in strapped]  # lines tell the others
     exchanged = exchanged_courses(straps.radius_m, plates, both)
     far = {
@@ -289,7 +289,7 @@ def _slope_and_shortness(job, straps, plates_m):
     plate = float(np.median(plates_m))
     short = job.tank.nominal_diameter_m / 2 - float(np.median(straps.radius_m - plates_m))
     short = short / plate if plate > 0 else 0.0
-    strapped = {one.strap.course for one in straps.reduced}
+    strapped = {reduced_strap.strap.course for reduced_strap in straps.reduced}
     if len(strapped) < len(plates_m) or np.ptp(plates_m) < LEAST_STEP_M:
         return np.inf, short
     if job.diameter_is is not None:  # `check_side` looks to the plate
@@ -322,7 +322,7 @@ def _of_first_course(job, straps):
 
 def _of_one_course(job, straps):
     """A tank whose size the straps of one course alone tell: lines tell the others from it."""
-    strapped = {one.strap.course for one in straps.reduced}
+    strapped = {reduced_strap.strap.course for reduced_strap in straps.reduced}
     if job.lines is None or job.radii is not None or len(strapped) > 1 or is_size_declared(job):
         return
     text = message(
@@ -351,6 +351,6 @@ def _uncontrolled(job, wall):
 
 def read_once(names, wall):
     """Those of the courses or rings that a single reading tells."""
-    read = [one.course for one in wall.accepted if one.of != FORMER]
+    read = [reading.course for reading in wall.accepted if reading.of != FORMER]
     counts = np.bincount(read, minlength=len(names))
     return [name for name, count in zip(names, counts, strict=True) if count == 1]

@@ -105,11 +105,11 @@ def open_questions(job, datum, causes):
         )
         problems.append(Problem("job.toml", text, column="datum.bottom_z_m"))
     scales = [
-        message("with_u", "{name} ({u:g} {unit})", name=one.name, u=one.u, unit=one.unit)
-        for one in causes
-        if one.what == OWN_SCALE
+        message("with_u", "{name} ({u:g} {unit})", name=cause.name, u=cause.u, unit=cause.unit)
+        for cause in causes
+        if cause.what == OWN_SCALE
     ]
-    if scales and any(one.name == "scale" for one in job.inputs):
+    if scales and any(declared_input.name == "scale" for declared_input in job.inputs):
         text = message(
             "scale_twice",
             "scale is declared, and that of {instruments} in instruments.toml is already in "

@@ -111,7 +111,7 @@ class Wall:
         if self.read is None:
             return found
         outside = job.survey.side == "outside"  # a reading sees a plate that is not taken off it
-        taken = [one.by_inputs.get("plate_thickness", 0.0) for one in self.readings]
+        taken = [reading.by_inputs.get("plate_thickness", 0.0) for reading in self.readings]
         sees = np.append(np.full(self.points_read, outside), outside - np.array(taken))
         gauged = {} if self.straps is None else self.straps.plate_sd_m
         plates = factors_of_plates(names_of(job.courses), self.field, weights * sees, gauged)
@@ -127,7 +127,9 @@ class Wall:
         """
         if len(weights) > weights.shape[1]:
             of_readings = self._factors_of_points(causes, np.eye(weights.shape[1]))
-            return tuple(one.mapped(lambda columns: weights @ columns) for one in of_readings)
+            return tuple(
+                reading.mapped(lambda columns: weights @ columns) for reading in of_readings
+            )
         covariance, index = self._covariance_of(weights), coordinates_of(self.accepted)
         effects = [weights @ (self.radii_by_points @ cause.column_m[index]) for cause in causes]
         return survey_factors(covariance, self.noise_dof, causes, effects)

@@ -136,7 +136,7 @@ def placed(job, problems):
     """Problems by workbook and sheet where the job stands in one."""
     if not job.source.endswith(".xlsx"):
         return tuple(problems)
-    return tuple(in_book(one, job.source) for one in problems)
+    return tuple(in_book(problem, job.source) for problem in problems)
 
 
 def _adjusted(job, progress):

@@ -256,7 +256,7 @@ def _without_rounding(volumes, areas, sources):
     empty = (np.abs(volumes) <= least) & (u <= least)
     flat = np.abs(areas) <= ROUNDING * np.max(np.abs(areas), initial=0.0)
     rows = empty[:, None]
-    sources = tuple(one.mapped(lambda columns: np.where(rows, 0.0, columns)) for one in sources)
+    sources = tuple(cause.mapped(lambda columns: np.where(rows, 0.0, columns)) for cause in sources)
     return np.where(empty, 0.0, volumes), np.where(flat, 0.0, areas), sources
 
 

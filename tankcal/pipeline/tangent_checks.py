@@ -70,7 +70,7 @@ def judge_tangents(job, wall, touching):
     departure[counted], w[counted] = wall.shell.residual_m, wall.shell.w
     used = np.zeros(n, dtype=bool)
     used[counted[wall.accepted]] = True
-    order = np.concatenate([one.group.members for one in wall.sections])
+    order = np.concatenate([section.group.members for section in wall.sections])
     sites = len(wall.field.radius_m) - len(wall.readings)
     if sites != len(order):  # several in a cell
         return TangentTests(used, departure, w, redundancy, mdb, {})
@@ -112,7 +112,7 @@ def check_tangents(job, wall, touching):
 def _of_scale(job):
     """A traverse whose distances one instrument measured, without a tape or a bar."""
     read = () if job.measurements is None else job.measurements.readings
-    names = {one.instrument for one in job.tangents.setups.values()}
+    names = {setup.instrument for setup in job.tangents.setups.values()}
     is_alone = len(names) == 1 and "distances" not in {table.table for table in read}
     return check_size_told(job, [*names]) if is_alone else ()
 

@@ -28,14 +28,14 @@ def check_tapes(job, straps):
         *_of_pulls(straps),
         *_of_certificates(straps),
         *_of_comparisons(job, straps),
-        *_of_copies([one.strap for one in straps.reduced]),
+        *_of_copies([reduced_strap.strap for reduced_strap in straps.reduced]),
     )
 
 
 def _of_temperatures(job, straps):
     shell = job.survey.shell_temperature_c
-    for one in straps.reduced:
-        tape = one.strap.temperature_c
+    for reduced_strap in straps.reduced:
+        tape = reduced_strap.strap.temperature_c
         if tape is None or shell is None or abs(tape - shell) <= UNLIKE_K:
             continue
         celsius = (tape - 32) / 1.8
@@ -56,13 +56,13 @@ def _of_temperatures(job, straps):
                 tape=tape,
                 shell=shell,
             )
-        yield Problem(FILE, text, one.strap.row, "temperature_c")
+        yield Problem(FILE, text, reduced_strap.strap.row, "temperature_c")
 
 
 def _of_no_shell_temperature(job, straps):
     """Tapes far from the table's temperature, and nobody says that of their shell."""
-    read = [one.strap.temperature_c for one in straps.reduced]
-    read = [one for one in read if one is not None]
+    read = [reduced_strap.strap.temperature_c for reduced_strap in straps.reduced]
+    read = [offset for offset in read if offset is not None]
     base = job.table.reference_temperature_c
     is_given = job.survey.shell_temperature_c is not None or not job.switches.temperature
     if is_given or not read:
@@ -85,23 +85,23 @@ def _of_pulls(straps):
     each tape and pull.
     """
     certified, seen = {tape.name: tape.tension_n for tape, _ in straps.tapes}, set()
-    for one in straps.reduced:
-        pull, of_tape = one.strap.tension_n, certified.get(one.strap.tape)
+    for reduced_strap in straps.reduced:
+        pull, of_tape = reduced_strap.strap.tension_n, certified.get(reduced_strap.strap.tape)
         if not (pull and of_tape) or 1 / PULL <= pull / of_tape <= PULL:
             continue
-        if (one.strap.tape, pull) in seen:
+        if (reduced_strap.strap.tape, pull) in seen:
             continue
-        seen.add((one.strap.tape, pull))
+        seen.add((reduced_strap.strap.tape, pull))
         text = message(
             "pull_unlike_certificate",
             "{pull_n:g} N, and {certified_n:g} N in the certificate of {tape!r}: is one of them in"
             " {units}?",
             pull_n=pull,
             certified_n=of_tape,
-            tape=one.strap.tape,
+            tape=reduced_strap.strap.tape,
             units=_units_near(pull, of_tape),
         )
-        yield Problem(FILE, text, one.strap.row, "tension_n")
+        yield Problem(FILE, text, reduced_strap.strap.row, "tension_n")
 
 
 def _units_near(first_n, second_n):
@@ -162,7 +162,11 @@ def _of_certificates(straps):
 
 def _of_whole_correction(tape, straps):
     """Both corrections of a tape together against the length that was read with it."""
-    read = [one.strap.reading_m for one in straps.reduced if one.strap.tape == tape.name]
+    read = [
+        reduced_strap.strap.reading_m
+        for reduced_strap in straps.reduced
+        if reduced_strap.strap.tape == tape.name
+    ]
     length = float(np.median(read))
     limit = limits_of("strapping")["class_ii"]
     most = (limit["mm"] + limit["mm_per_m"] * length) / 1000
@@ -184,7 +188,7 @@ def _of_comparisons(job, straps):
     """Comparisons with a master that differ by more than their standard deviations allow."""
     used = [tape for tape, _ in straps.tapes if tape.master]
     strapping = job.strapping if job.great_circles is None else job.great_circles.strapping
-    many = [one for one in strapping.comparisons if one.sd_m > 0]
+    many = [comparison for comparison in strapping.comparisons if comparison.sd_m > 0]
     if not used or len(many) < 2:
         return
     apart = np.array([one.master_m - one.working_m for one in many])

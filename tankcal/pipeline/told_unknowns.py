@@ -80,17 +80,17 @@ def told_unknowns(points, unbound, field, parts):
     """
     accepted, by_points, covariance = parts
     shared, index = offsets_then_poses(points), coordinates_of(accepted)
-    sizes, count = np.array([size_of(one) for one in shared]), unbound.offsets.shape[1]
+    sizes, count = np.array([size_of(effect) for effect in shared]), unbound.offsets.shape[1]
     ways = sizes[:, None] * unbound.ways_of(field.sites)
     mine = slice(0, ways.shape[1])  # those of lines come after them
     values, spread = field.shared
     sure = _surely_told(spread[mine, mine], count)
     ways, spread = ways @ sure, sure.T @ spread[mine, mine] @ sure
     by_readings, values = sure.T @ field.shared_by_readings[mine], sure.T @ values[mine]
-    moved = np.column_stack([one.column_m[index] for one in shared]) @ ways
+    moved = np.column_stack([effect.column_m[index] for effect in shared]) @ ways
     off = -(ways @ values)
     return ToldUnknowns(
-        offsets_m={one.name: float(off[i]) for i, one in enumerate(shared[:count])},
+        offsets_m={effect.name: float(off[i]) for i, effect in enumerate(shared[:count])},
         poses=off[count:].reshape(-1, 3),
         largest_m=float(np.abs(moved @ values).max(initial=0.0)),
         by_readings=by_readings,

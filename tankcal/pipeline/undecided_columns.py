@@ -30,7 +30,7 @@ def undecided_halves(shell, accepted, groups):
     ndarray, shape (m, columns)
         In the order of the groups' members, m.
     """
-    order = accepted[np.concatenate([one.members for one in groups])]
+    order = accepted[np.concatenate([group.members for group in groups])]
     columns = np.arange(shell.column.max(initial=-1) + 1)
     return 0.5 * shell.residual_m[order, None] * np.equal.outer(shell.column[order], columns)
 

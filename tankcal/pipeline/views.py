@@ -70,7 +70,7 @@ def _capacity(plots, result):
 
 def _budget(plots, result):
     lines = result.budget().lines
-    return plots.budget_bars([(one.name, one.share, one.is_default) for one in lines])
+    return plots.budget_bars([(line.name, line.share, line.is_default) for line in lines])
 
 
 def _sections(plots, result):

@@ -129,11 +129,11 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
         covariance = covariance * (shell.noise_m / median_sd(sds)) ** 2
     to_fit = _to_fit(job, shell, accepted, groups, covariance)
     nominal = job.tank.nominal_diameter_m / 2
-    samples = [sample_of(*one) for one in to_fit]
+    samples = [sample_of(*section) for section in to_fit]
     of_wall = {"welds_rad": _welds(job), "spans": spans_of(joints), "smoothed": is_smoothed(job)}
     sites, means = _sites(groups, samples, nominal, of_wall)
     undecided = means @ undecided_halves(shell, accepted, groups)
-    radius = means @ np.concatenate([one.radius_m for one in samples]) - undecided.sum(axis=1)
+    radius = means @ np.concatenate([sample.radius_m for sample in samples]) - undecided.sum(axis=1)
     noise = (means @ scipy.sparse.block_diag(_blocks(samples)) @ means.T).toarray()
     is_known = amplitudes is not None
     amplitudes = amplitudes if is_known else sizes
@@ -156,12 +156,12 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
         noise *= amplitudes.noise
         to_fit = _to_fit(job, shell, accepted, groups, covariance)
     form_m2 = _form_m2(amplitudes)
-    sections = tuple(fit_section(*one, form_m2) for one in to_fit)
+    sections = tuple(fit_section(*section, form_m2) for section in to_fit)
     by_points = means @ _radii_by_points(sections, len(accepted))
     by_inputs = _by_inputs(job.points, by_points, accepted)
     is_read = job.strapping is not None or job.lines is not None
     is_read = is_read or (
-        job.radii is not None and len({one.course for one in groups}) < len(job.courses)
+        job.radii is not None and len({group.course for group in groups}) < len(job.courses)
     )
     if is_read or job.points.unbound or by_inputs or job.tangents is not None:
         unbound = unbound_of(job.points, by_points, accepted)
@@ -199,7 +199,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
         read=read,
         by_inputs=by_inputs,
         without_inputs=("offset",) if job.hits or job.clouds else (),  # instruments have their own
-        origins_m=np.array([one.centre_m for one in samples]),
+        origins_m=np.array([sample.centre_m for sample in samples]),
         told=told,
     )
 
@@ -266,13 +266,13 @@ def _sites(groups, samples, nominal_m, of_wall):
 
     of_wall  what the sites have of the whole wall, by the names of their attributes
     """
-    counts = [len(one.radius_m) for one in samples]
+    counts = [len(sample.radius_m) for sample in samples]
     sites = Sites(
-        course=np.repeat([one.course for one in groups], counts),
+        course=np.repeat([group.course for group in groups], counts),
         ring=np.repeat(np.arange(len(groups)), counts),
-        zeta=np.concatenate([one.zeta for one in samples]),
-        azimuth_rad=np.concatenate([one.azimuth_rad for one in samples]),
-        leans=np.repeat([one.degree > 0 for one in groups], counts),
+        zeta=np.concatenate([sample.zeta for sample in samples]),
+        azimuth_rad=np.concatenate([sample.azimuth_rad for sample in samples]),
+        leans=np.repeat([group.degree > 0 for group in groups], counts),
         **of_wall,
     )
     if len(sites) <= MOST_SITES:
@@ -285,23 +285,23 @@ def _sites(groups, samples, nominal_m, of_wall):
 def _blocks(samples):
     """Covariance of the radii of each sample."""
     return [
-        scipy.sparse.diags_array(one.covariance_m2)
-        if np.ndim(one.covariance_m2) == 1
-        else one.covariance_m2
-        for one in samples
+        scipy.sparse.diags_array(sample.covariance_m2)
+        if np.ndim(sample.covariance_m2) == 1
+        else sample.covariance_m2
+        for sample in samples
     ]
 
 
 def _form_m2(amplitudes):
     """Amplitude of k^-3 that has all departures from a circle: what smooths an outline."""
-    chosen = [one.shape in ROUND_SHAPES for one in COMPONENTS]
+    chosen = [component.shape in ROUND_SHAPES for component in COMPONENTS]
     return float(np.sum(amplitudes.likely_m2[chosen])) / np.sum(OVALITY_MODES**-3)
 
 
 def _radii_by_points(sections, count):
     """(m, 3 m) derivative of the radii of all sections, one after another, by all points."""
-    rows = scipy.sparse.block_diag([one.radii_by_points for one in sections], format="csc")
-    order = np.concatenate([coordinates_of(one.group.members) for one in sections])
+    rows = scipy.sparse.block_diag([section.radii_by_points for section in sections], format="csc")
+    order = np.concatenate([coordinates_of(section.group.members) for section in sections])
     place = np.empty(3 * count, dtype=int)
     place[order] = np.arange(len(order))
     return rows[:, place].tocsr()

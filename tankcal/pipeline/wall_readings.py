@@ -65,24 +65,24 @@ def readings_of_straps(used, courses, term):
     term     `AreaTerm`
     """
     found = []
-    for one in used:
+    for reading in used:
         per_m = 1 / (2 * np.pi * np.sqrt(1 + term.mean))
-        radius = per_m * one.circumference_m
+        radius = per_m * reading.circumference_m
         effects = {
             (effect.kind, effect.name): (effect.u, effect.unit, effect.by_m * per_m)
-            for effect in one.effects
+            for effect in reading.effects
         }
         if term.sd:
             by_m = -radius / (2 * (1 + term.mean)) * term.sd
             effects["area_term", ""] = (1e6 * term.sd, "ppm", by_m)
-        by = {"shell_temperature": one.by_shell_temperature_m * per_m}
+        by = {"shell_temperature": reading.by_shell_temperature_m * per_m}
         found.append(
             WallReading(
                 "straps",
-                courses.index(one.strap.course),
-                one.strap.level_m,
+                courses.index(reading.strap.course),
+                reading.strap.level_m,
                 radius,
-                one.sd_m * per_m,
+                reading.sd_m * per_m,
                 effects=effects,
                 by_inputs={name: value for name, value in by.items() if value},
             )
@@ -155,27 +155,29 @@ def readings_of_untold(job, told, joints_m, zero_m):
 def off_centre(readings, field):
     """The readings as from the centre of their level: R lacks (e x n)^2 / (2 rho) of a circle."""
     centres, found = field.centres_m, []
-    for one in readings:
-        if one.ring < 0:
-            found.append(one)
+    for reading in readings:
+        if reading.ring < 0:
+            found.append(reading)
             continue
-        x, y = centres[one.ring]
-        across = x * np.cos(one.azimuth_rad) - y * np.sin(one.azimuth_rad)
-        found.append(replace(one, radius_m=one.radius_m + across**2 / (2 * field.nominal_m)))
+        x, y = centres[reading.ring]
+        across = x * np.cos(reading.azimuth_rad) - y * np.sin(reading.azimuth_rad)
+        found.append(
+            replace(reading, radius_m=reading.radius_m + across**2 / (2 * field.nominal_m))
+        )
     return found
 
 
 def sites_of(readings, joints_m, zero_m):
     """`Sites` of readings; zero_m is the height of the table's zero above the bottom."""
-    course = np.array([one.course for one in readings], dtype=int)
-    level = np.array([one.level_m for one in readings]) + zero_m
+    course = np.array([reading.course for reading in readings], dtype=int)
+    level = np.array([reading.level_m for reading in readings]) + zero_m
     low, high = joints_m[course], joints_m[course + 1]
-    free = columns_of([one.free for one in readings])
+    free = columns_of([reading.free for reading in readings])
     return Sites(
         course=course,
-        ring=np.array([one.ring for one in readings], dtype=int),
+        ring=np.array([reading.ring for reading in readings], dtype=int),
         zeta=2 * (level - low) / (high - low) - 1,
-        azimuth_rad=np.array([one.azimuth_rad for one in readings]),
+        azimuth_rad=np.array([reading.azimuth_rad for reading in readings]),
         leans=np.zeros(len(readings), dtype=bool),
         shared=np.column_stack(list(free.values())) if free else None,
         spans=spans_of(joints_m),
@@ -184,14 +186,14 @@ def sites_of(readings, joints_m, zero_m):
 
 def names_of(courses):
     """Names of courses, or of rings."""
-    return [one.name for one in courses]
+    return [course.name for course in courses]
 
 
 def noise_of(readings):
     """(n, n) covariance of the radii: what each reading has of its own, and what they share."""
     shared = shared_effects(readings).values()
     common = np.column_stack([np.zeros(len(readings)), *(column for *_, column in shared)])
-    return np.diag([one.sd_m**2 for one in readings]) + common @ common.T
+    return np.diag([reading.sd_m**2 for reading in readings]) + common @ common.T
 
 
 def noise_by_inputs(inputs, columns, count):
@@ -201,7 +203,7 @@ def noise_by_inputs(inputs, columns, count):
     inputs   with name and u, SI
     columns  {input: (n,) derivative of the radii}
     """
-    known = {one.name: one.u for one in inputs}
+    known = {declared_input.name: declared_input.u for declared_input in inputs}
     found = np.zeros((count, count))
     for name, column in columns.items():
         found += known.get(name, 0.0) ** 2 * np.outer(column, column)
@@ -258,8 +260,8 @@ def factors_of_readings(readings, weights):
     weights  (f, n) derivative of the features by their radii
     """
     found = []
-    for kind in dict.fromkeys(one.of for one in readings):
-        own = weights * np.array([one.sd_m * (one.of == kind) for one in readings])
+    for kind in dict.fromkeys(reading.of for reading in readings):
+        own = weights * np.array([reading.sd_m * (reading.of == kind) for reading in readings])
         found.append(Factor(kind, own))
     for (kind, name), (u, unit, column) in shared_effects(readings).items():
         by = (weights @ column)[:, None]
@@ -282,7 +284,7 @@ def factors_of_plates(names, field, weights, plate_sd_m):
 
 def inputs_read_with(readings, weights):
     """{input of a budget: (f,) derivative of features}, of inputs that readings depend on."""
-    rows = columns_of([one.by_inputs for one in readings])
+    rows = columns_of([reading.by_inputs for reading in readings])
     return {name: weights @ column for name, column in rows.items()}
 
 

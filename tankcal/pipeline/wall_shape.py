@@ -104,11 +104,11 @@ def wall_shape_of(job, wall):
     if not isinstance(wall, Wall) or job.radii is not None:
         return None
     levels = _levels(job, wall)
-    plumbed = [i for i, one in enumerate(levels) if one.ring >= 0]
-    pairs = [(plumbed[0], one) for one in plumbed[1:]]
+    plumbed = [i for i, level in enumerate(levels) if level.ring >= 0]
+    pairs = [(plumbed[0], number) for number in plumbed[1:]]
     of_courses = _pairs_of_courses(wall, levels, plumbed)
     base = ShapeBase(job, wall, levels, plumbed, (*pairs, *of_courses))
-    rows = [base.radii(i, one.azimuth_rad) for i, one in enumerate(levels)]
+    rows = [base.radii(i, level.azimuth_rad) for i, level in enumerate(levels)]
     rows += [base.plumb(*pair) for pair in (*pairs, *of_courses)]
     if pairs:
         rows.append(base.axis(*pairs[-1]))

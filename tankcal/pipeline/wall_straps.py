@@ -55,7 +55,13 @@ def typical_shape_m():
 
     It is the root of the summed median variances of ovality, settlement and seams, 6.1 mm.
     """
-    return float(np.sqrt(sum(one.median_m**2 for one in COMPONENTS if one.shape in ROUND_SHAPES)))
+    return float(
+        np.sqrt(
+            sum(
+                component.median_m**2 for component in COMPONENTS if component.shape in ROUND_SHAPES
+            )
+        )
+    )
 
 
 def area_term(shape_sd_m, amplitudes, nominal_m, points=None):
@@ -66,7 +72,7 @@ def area_term(shape_sd_m, amplitudes, nominal_m, points=None):
     """
     is_declared = shape_sd_m is not None
     if not is_declared:
-        waves = [one.shape in ROUND_SHAPES for one in COMPONENTS]
+        waves = [component.shape in ROUND_SHAPES for component in COMPONENTS]
         shape_sd_m = float(np.sqrt(amplitudes.likely_m2[waves].sum()))
     if is_declared or points is None:
         return AreaTerm(*perimeter_excess(shape_sd_m, nominal_m)), shape_sd_m
@@ -148,7 +154,7 @@ def gauged_plates(job):
     job.
     """
     read, parts = job.strapping.plate_sd_m, job.courses or job.rings
-    return {i: read[one.name] for i, one in enumerate(parts) if one.name in read}
+    return {i: read[part.name] for i, part in enumerate(parts) if part.name in read}
 
 
 def mean_radii(field):
@@ -180,12 +186,14 @@ class PointsOfWall:
 
 def told_courses(job, seen):
     """Indices of the courses that points (of a set of them), straps or reference lines tell."""
-    place, strapped, read = {one.name: i for i, one in enumerate(job.courses)}, (), ()
+    place, strapped, read = {course.name: i for i, course in enumerate(job.courses)}, (), ()
     if job.strapping is not None:
-        strapped = (one.course for one in job.strapping.straps if not one.check)
+        strapped = (strap.course for strap in job.strapping.straps if not strap.check)
     if job.lines is not None:
-        read = (one.course for one in job.lines.offsets if not one.check)
-    return courses_told(seen, {place[one] for one in strapped}, {place[one] for one in read})
+        read = (offset.course for offset in job.lines.offsets if not offset.check)
+    return courses_told(
+        seen, {place[strap] for strap in strapped}, {place[offset] for offset in read}
+    )
 
 
 def join_readings(job, points, amplitudes, joints_m, *, is_known):
@@ -210,15 +218,15 @@ def join_readings(job, points, amplitudes, joints_m, *, is_known):
         are on.
     straps : Straps or None
     """
-    nominal, names = job.tank.nominal_diameter_m / 2, [one.name for one in job.courses]
-    inner = np.array([one.thickness_m + one.paint_m for one in job.courses])
+    nominal, names = job.tank.nominal_diameter_m / 2, [course.name for course in job.courses]
+    inner = np.array([course.thickness_m + course.paint_m for course in job.courses])
     inner *= job.survey.side == "inside"
     zero = job.datum.plate_level_m
     taped, readings, places = None, [], []
     if job.strapping is not None:
         given = job.strapping
         reduced = reduce_straps(given, job.survey.shell_temperature_c, 2 * nominal)
-        places = [i for i, one in enumerate(reduced) if not one.strap.check]
+        places = [i for i, reduced_strap in enumerate(reduced) if not reduced_strap.strap.check]
         seen = None if is_known else points  # those of a plan are nominal and show no form
         term, shape = area_term(given.shape_sd_m, amplitudes, nominal, seen)
         readings = readings_of_straps([reduced[i] for i in places], names, term)
@@ -230,7 +238,9 @@ def join_readings(job, points, amplitudes, joints_m, *, is_known):
     told = told_courses(job, set(points.sites.course.tolist()))
     former = readings_of_untold(job, told, joints_m, zero)
     readings, places = readings + former, places + [-1] * len(former)
-    readings = [_on_surface(one, inner[one.course], job.survey.side) for one in readings]
+    readings = [
+        _on_surface(reading, inner[reading.course], job.survey.side) for reading in readings
+    ]
     if not is_known and len(np.unique(points.sites.course)) < len(names):
         amplitudes = None
     field, tested, readings = _joined_field(job, points, readings, amplitudes, (joints_m, zero))
@@ -242,7 +252,7 @@ def join_readings(job, points, amplitudes, joints_m, *, is_known):
 
 def _offsets_of(lines, names, insets, sites):
     """`WallReading`s of the offsets that count, and their places; rings after those of points."""
-    places = [i for i, one in enumerate(lines.offsets) if not one.check]
+    places = [i for i, offset in enumerate(lines.offsets) if not offset.check]
     found = readings_of_offsets(lines, [lines.offsets[i] for i in places], names, insets)
     first = int(sites.ring.max(initial=-1)) + 1
     return [one if one.ring < 0 else replace(one, ring=one.ring + first) for one in found], places
@@ -262,7 +272,7 @@ def _joined_field(job, points, readings, amplitudes, heights):
     if sites.shared is not None:  # of lines: the last, as `ReadWall` has them
         own = np.pad(sites.shared, ((n, 0), (0, 0)))
         both = replace(both, shared=own if is_bound else np.hstack([both.shared, own]))
-    columns = columns_of([one.by_inputs for one in readings])
+    columns = columns_of([reading.by_inputs for reading in readings])
     columns = {
         name: np.append(points.by_inputs.get(name, np.zeros(n)), columns.get(name, np.zeros(k)))
         for name in dict.fromkeys((*points.by_inputs, *columns))
@@ -271,8 +281,8 @@ def _joined_field(job, points, readings, amplitudes, heights):
     noise += noise_by_inputs(job.inputs, columns, n + k)
     straps_may = is_bound or _circumferences(job) >= FEWEST_CIRCUMFERENCES
     may = [
-        job.snooping and one.of != FORMER and (straps_may or one.of == "offsets")
-        for one in readings
+        job.snooping and reading.of != FORMER and (straps_may or reading.of == "offsets")
+        for reading in readings
     ]
     may_go = np.append(np.zeros(n), may)
 
@@ -287,22 +297,25 @@ def _joined_field(job, points, readings, amplitudes, heights):
             size = estimate_amplitudes(both.take(accepted), radius[some], own, nominal)
         return WallField(both.take(accepted), radius[some], own, size, nominal, plumbed=apart)
 
-    radius, every = np.append(points.radius_m, [one.radius_m for one in readings]), np.ones(n + k)
+    radius, every = (
+        np.append(points.radius_m, [reading.radius_m for reading in readings]),
+        np.ones(n + k),
+    )
     field = field_of(every > 0)
     if np.any(sites.ring >= 0):
         readings = off_centre(readings, field)
-        radius = np.append(points.radius_m, [one.radius_m for one in readings])
+        radius = np.append(points.radius_m, [reading.radius_m for reading in readings])
         field = field_of(every > 0)
     field, tested = settle_readings(field, field_of, (both, radius, noise), may_go)
     parts = (tested.accepted, tested.departure_m, tested.w, tested.sd_m)
-    return field, Tested(*(one[n:] for one in parts)), readings
+    return field, Tested(*(part[n:] for part in parts)), readings
 
 
 def _circumferences(job):
     """How many were strapped and count; repeats are one."""
     if job.strapping is None:
         return 0
-    return len({one.name for one in job.strapping.straps if not one.check})
+    return len({strap.name for strap in job.strapping.straps if not strap.check})
 
 
 def _straps_of(job, read, taped, inner_m):

@@ -103,7 +103,7 @@ def warn_of_taper(job, field):
     A taper that all courses share moves the table then. Lapped plates have more of it than U has,
     which knows how far butt-welded ones may taper.
     """
-    if any(one.name == "taper" for one in job.inputs):
+    if any(declared_input.name == "taper" for declared_input in job.inputs):
         return []
     sites = field.sites
     parts = [(sites.zeta[members] + 1) / 2 for members in sites.members if len(members)]
@@ -126,7 +126,7 @@ def warn_of_taper(job, field):
 
 
 def _variance_m2(field, component):
-    names = [one.name for one in COMPONENTS]
+    names = [component.name for component in COMPONENTS]
     return field.amplitudes.variances_m2[names.index(component)]
 
 

@@ -128,7 +128,10 @@ class _Law:
 def _moments(law, of_rest, linear, rest, volume, ready):
     """(sets, 2) mean and u: the linear part of R is known, what is added comes from the draws."""
     slopes = rest.jacobian[volume]
-    felt, sds = slopes != 0, np.array([one.sd for one in ready.distributions] if ready else [])
+    felt, sds = (
+        slopes != 0,
+        np.array([distribution.sd for distribution in ready.distributions] if ready else []),
+    )
     known = np.sum((slopes[felt] * sds[felt]) ** 2)
     curved = of_rest - linear
     spread = known + curved.var(axis=1) + law.variance

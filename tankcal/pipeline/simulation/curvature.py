@@ -51,11 +51,13 @@ def vary_input(job, name, change):
         return _with(job, part, key, change)
     if name in ("plate_thickness", "paint") and job.courses:
         key = {"plate_thickness": "thickness_m", "paint": "paint_m"}[name]
-        courses = (replace(one, **{key: getattr(one, key) + change}) for one in job.courses)
+        courses = (
+            replace(course, **{key: getattr(course, key) + change}) for course in job.courses
+        )
         return replace(job, courses=tuple(courses))
     if name in ("plate_thickness", "paint") and job.rings:
         key = {"plate_thickness": "thickness_m", "paint": "paint_m"}[name]
-        rings = tuple(replace(one, **{key: getattr(one, key) + change}) for one in job.rings)
+        rings = tuple(replace(ring, **{key: getattr(ring, key) + change}) for ring in job.rings)
         moved = replace(job, rings=rings)
         return moved if name == "paint" else _of_solid(moved, name, change)
     if job.tank.kind == "vertical":

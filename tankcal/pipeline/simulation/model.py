@@ -94,7 +94,11 @@ class Model:
         self.levels = np.minimum(table.height_m + zero_m, body.highest_m)
         self.inputs = coordinates([one.mapped(self._both) for one in table.sources])
         declared = body.declared if body.is_bent else ()
-        u = {one.name: one.u for one in declared if one.name in self.inputs.place and one.u}
+        u = {
+            declared_input.name: declared_input.u
+            for declared_input in declared
+            if declared_input.name in self.inputs.place and declared_input.u
+        }
         self.datum_m = u.get("datum", 0.0)
         self.curved = curvature(job, survey, body, self.levels, u, table.u_m3)
         self.quadratic = self._quadratic()
@@ -118,7 +122,7 @@ class Model:
         places = np.sort(np.concatenate([even, bent]))
         u = np.linalg.norm(self.inputs.slopes, axis=1)
         full = spread_to_all(found, places, self.quadratic.value, u, goal.digits)
-        endless = [not np.isfinite(one.sd) for one in self.inputs.distributions]
+        endless = [not np.isfinite(distribution.sd) for distribution in self.inputs.distributions]
         without_u = np.any(self.inputs.slopes[:, endless] != 0, axis=1)
         full = replace(full, u=np.where(without_u, np.inf, full.u))
         return full, int(np.count_nonzero(places < self.rows))

@@ -65,7 +65,7 @@ def _of_heads(job):
     centre, top = job.bottom.centre_z_m, job.top
     heads = [one for one in (job.bottom, top) if one is not None]
     dishes, knuckles = (
-        [1000 * getattr(one, key) for one in heads if getattr(one, key)]
+        [1000 * getattr(head, key) for head in heads if getattr(head, key)]
         for key in ("dish_radius_m", "knuckle_radius_m")
     )
     return {

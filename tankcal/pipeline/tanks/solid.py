@@ -130,14 +130,16 @@ def _with_sizes(job, names, values):
 
 def _of_scan(scan, scale):
     """What the survey gives, as arguments of `SolidPart`; volumes are to scale."""
-    factors = tuple(replace(one, columns=scale**3 * one.columns) for one in scan.form.factors)
+    factors = tuple(
+        replace(factor, columns=scale**3 * factor.columns) for factor in scan.form.factors
+    )
     return {"surveyed": scan.names, "form": replace(scan.form, factors=factors)}
 
 
 def _of_circles(sphere, plate_m, scale):
     """What great circles give, as arguments of `SolidPart`; volumes are to scale."""
     form, read_with = sphere.part_of_volumes(plate_m)
-    factors = tuple(replace(one, columns=scale**3 * one.columns) for one in form.factors)
+    factors = tuple(replace(factor, columns=scale**3 * factor.columns) for factor in form.factors)
     return {
         "surveyed": ("diameter",),
         "form": replace(form, factors=factors),

@@ -214,7 +214,7 @@ def _bottom(job, wall, shell):
     if bottom.xyz_m is not None:
         xyz = bottom.xyz_m - (0.0, 0.0, low)
         causes = bottom.shared if bottom.form == OF_CLOUD else None
-        shared = causes and cause_factors(causes, [one.column_m for one in causes])
+        shared = causes and cause_factors(causes, [cause.column_m for cause in causes])
         return surveyed_bottom(footprint, xyz, bottom.sd_m, wall.shell.slope, shared)
     rise = 0.0 if bottom.centre_z_m is None else bottom.centre_z_m - low
     depth, *radii = _sizes_of_head(bottom, footprint.area_m2, abs(rise))
@@ -310,7 +310,7 @@ def _shell(job, wall, switches, uncertain):
 
 
 def _declared(job):
-    return {one.name for one in job.inputs}
+    return {declared_input.name for declared_input in job.inputs}
 
 
 def _factors(job, wall, volume, features):
@@ -335,10 +335,10 @@ def _of_the_unseen(wall, volume, features, declared, *, scanned):
     for kind in KINDS:
         chosen = [
             index
-            for index, one in enumerate(COMPONENTS)
-            if one.kind == kind
-            and one.declared_as not in declared
-            and (one.shape == "mean" or wall.field.stated)
+            for index, component in enumerate(COMPONENTS)
+            if component.kind == kind
+            and component.declared_as not in declared
+            and (component.shape == "mean" or wall.field.stated)
         ]
         if chosen:
             parts = [features.unseen(index) for index in chosen]
@@ -346,7 +346,7 @@ def _of_the_unseen(wall, volume, features, declared, *, scanned):
             if kind == "seams" and not scanned:
                 parts.append(_of_hidden_seams(features, top, sum(parts)))
                 told = np.append(told, 1.0)
-            found.append(factor_of_unseen(kind, parts, [top @ one @ top for one in parts], told))
+            found.append(factor_of_unseen(kind, parts, [top @ part @ top for part in parts], told))
     return tuple(one for one in found if one.columns.shape[1])
 
 
