@@ -16,13 +16,13 @@ from tankcal.survey.untied import sees_all_around
 # Factors that convert an angle read as degrees but given in gon, and the reverse.
 GON_IN_DEG, DEG_IN_GON = 0.9, 1 / 0.9
 CLOSER = 0.2  # largest ratio of the scatter in another unit to that as read, to report the unit
-LEAST_M = 0.01  # smallest scatter about the circle that needs an explanation
-FEWEST = 12  # smallest number of hits of a set-up that is tested
+# Least scatter about the circle that needs an explanation, least number of hits of a set-up.
+LEAST_M, FEWEST = 0.01, 12
 LEAST_SINE = 1e-3  # lower bound of the sine of the zenith angle; avoids division by zero
 
 
 def refuse_other_units(hits):
-    """Raise InputError for hits that lie on a circle only in another unit or as horizontal distances.
+    """Raise InputError for hits that fit a circle only in another unit or as horizontal distances.
 
     Parameters
     ----------

@@ -16,10 +16,10 @@ from tankcal.survey.diagnosis.misread_files import OTHER_UNITS
 GON_IN_DEG, DEG_IN_GON = 0.9, 1 / 0.9
 # Limits of a line: largest range of directions, smallest number of hits, smallest height.
 NARROW_RAD, FEWEST, LEAST_RISE_M = 0.1, 5, 1.0
-OFF_M = 0.05  # rms from a straight line that needs an explanation
-CLOSER = 0.2  # largest part of that rms that another interpretation may leave
-IN_COURSE_M = 0.1  # tolerance of the height of a hit beyond the joints of its course
-FEW, MANY = 0.5, 0.9  # share of hits in their courses: as read, and in the true unit
+# Rms from a line that needs an explanation; largest part of it left in another interpretation.
+OFF_M, CLOSER = 0.05, 0.2
+# Tolerance of hits beyond the joints; share of hits in their courses as read, and in another unit.
+IN_COURSE_M, FEW, MANY = 0.1, 0.5, 0.9
 SHOWN = 4  # set-ups named in a message
 
 

@@ -1,7 +1,8 @@
 """Tangents that touch a circle only if their readings are interpreted otherwise.
 
-The checks try other units of direction, anticlockwise directions and exchanged limbs, for all set-ups
-together and for each. They report an interpretation that reduces the residuals sufficiently.
+The checks try other units of direction, anticlockwise directions and exchanged limbs, for all
+set-ups together and for each. They report an interpretation that reduces the residuals
+sufficiently.
 """
 
 import numpy as np

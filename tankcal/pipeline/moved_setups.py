@@ -1,17 +1,17 @@
 """Test of set-ups that were disturbed after the network, by the form that the other set-ups show.
 
-A rotated horizontal circle or a displaced station changes all sights of a set-up to a wall together.
-No single sight then differs from its neighbours. Let P be the reduced weight matrix of the wall
-readings y, with the free parameters eliminated. Let A be the derivative of y by the rotation and the
-displacement of a set-up. Then
+A rotated horizontal circle or a displaced station changes all sights of a set-up to a wall
+together. No single sight then differs from its neighbours. Let P be the reduced weight matrix of
+the wall readings y, with the free parameters eliminated. Let A be the derivative of y by the
+rotation and the displacement of a set-up. Then
 
     s = (A' P A)^-1 A' P y,     w^2 = s' A' P A s,
 
 and w^2 follows a chi-square distribution with three degrees of freedom for an undisturbed set-up.
 
-A set-up that sees few places can show waves of the wall as an apparent displacement: of six hits round
-a ring, five or seven waves look like one. If the other set-ups determine these waves, the test gives
-them a large prior variance, whatever the estimated spectrum of the field.
+A set-up that sees few places can show waves of the wall as an apparent displacement: of six hits
+round a ring, five or seven waves look like one. If the other set-ups determine these waves, the
+test gives them a large prior variance, whatever the estimated spectrum of the field.
 """
 
 from dataclasses import replace
@@ -123,8 +123,8 @@ def _waves(sites, wave_m):
 def _covariance_by_others(field, extra_m2, is_of_setup):
     """Covariance of the readings, m2, with amplitudes estimated without those of one set-up.
 
-    A disturbed set-up looks like a form of the wall if its own readings determine the amplitudes. The
-    result is None if the other readings do not cover all courses.
+    A disturbed set-up looks like a form of the wall if its own readings determine the amplitudes.
+    The result is None if the other readings do not cover all courses.
 
     Parameters
     ----------
@@ -149,7 +149,8 @@ def _covariance_by_others(field, extra_m2, is_of_setup):
 def _test_of_movement(columns, is_of_setup, precision, pull):
     """Test statistic w, rotation alone and displacement alone of one set-up."""
     columns = columns * is_of_setup[:, None]
-    # Equal scales of rotation and displacement: the pseudo-inverse then drops undetermined directions.
+    # Equal scales of rotation and displacement: the pseudo-inverse then drops undetermined
+    # directions.
     scale = np.maximum(np.abs(columns).max(axis=0), 1e-9)
     columns = columns / scale
     normal, right = columns.T @ precision @ columns, columns.T @ pull

@@ -29,7 +29,8 @@ class InsideRadii:
     plate_m : ndarray, shape (n,)
         Plate thicknesses including paint, m.
     sd_m : ndarray, shape (n,)
-        Standard uncertainties of the radii, m; 0 where negligible beside the allowance of a drawing.
+        Standard uncertainties of the radii, m; 0 where negligible beside the allowance of a
+        drawing.
     """
 
     names: tuple[str, ...]
@@ -64,8 +65,8 @@ def nominal_radius_m(job, plate_m):
 def departure_of_size(job, inside_m, plate_m, sd_m=0.0):
     """Difference between an inside radius and the nominal one, m; 0 within the allowance.
 
-    A nominal diameter of unstated kind may be the outside diameter. The difference is then taken to the
-    nearer of the two.
+    A nominal diameter of unstated kind may be the outside diameter. The difference is then taken to
+    the nearer of the two.
 
     Parameters
     ----------
@@ -123,7 +124,7 @@ def inside_radii(job, survey):
 
 
 def _sds_of_courses(wall, count):
-    """Standard uncertainty of the mean radius of each course from its circles, m, shape (count,)."""
+    """Standard uncertainty of the mean radius of each course from its circles, m."""
     sd_m = np.zeros(count)
     for course in range(count):
         circles = [section.circle for section in wall.sections if section.group.course == course]
@@ -166,8 +167,8 @@ def _where(names):
 def check_size(job, survey):
     """`Problem`s for a surveyed size that differs from the drawing by more than the allowance.
 
-    Straps, sights to a bare wall and great circles have checks of their own for the whole tank, by the
-    same rule.
+    Straps, sights to a bare wall and great circles have checks of their own for the whole tank, by
+    the same rule.
     """
     surveyed = inside_radii(job, survey)
     if surveyed is None or job.tank.nominal_diameter_m is None:
@@ -182,6 +183,7 @@ def check_size(job, survey):
     if survey.surveyed_as not in ("wall", "radii") or len(surveyed.names) == 1:
         return
     radii_and_sds = zip(surveyed.radius_m, surveyed.sd_m, strict=True)
+    # Single courses are compared only when the tank as a whole agrees with the drawing.
     departures_m = np.array(
         [departure_of_size(job, float(r), plate, float(sd)) for r, sd in radii_and_sds]
     )

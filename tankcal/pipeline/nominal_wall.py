@@ -47,7 +47,7 @@ class NominalWall(ReadWall):
         return 0.0, 0.0, np.full(len(azimuth_rad), self.radius_m[0])
 
     def factors(self, job, weights):
-        """`Factor`s of the uncertainty left by the drawing: of all courses together and of each course."""
+        """`Factor`s of the uncertainty of the drawing: common to all courses and of each course."""
         return tuple(
             replace(factor, type="B") for factor in factors_of_readings(self.accepted, weights)
         )
@@ -60,8 +60,8 @@ class NominalWall(ReadWall):
 def find_nominal_wall(job, progress=lambda text: None):
     """`NominalWall` of an upright job from its nominal diameter and courses.
 
-    The job's liquid section gives the standard uncertainty of a radius. Most of its variance is common
-    to all courses, because an error of the nominal diameter affects all courses.
+    The job's liquid section gives the standard uncertainty of a radius. Most of its variance is
+    common to all courses, because an error of the nominal diameter affects all courses.
 
     Parameters
     ----------

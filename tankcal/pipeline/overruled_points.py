@@ -1,4 +1,4 @@
-"""Manual decisions about points of the wall and about readings, applied to the input of the chain."""
+"""Manual decisions about points of the wall and about readings, applied to the data of a job."""
 
 from dataclasses import replace
 
@@ -139,8 +139,8 @@ def with_decided_readings(measurements, overrulings):
 def refuse_kept_readings(job, adjustment):
     """Raise InputError for kept readings that do not appear in the adjustment.
 
-    Either the reading was averaged with others, or the search rejected so many readings of its point that
-    the point is not adjusted.
+    Either the reading was averaged with others, or the search rejected so many readings of its
+    point that the point is not adjusted.
     """
     adjusted = set(
         zip(*(adjustment.readings.columns[column] for column in ("file", "row")), strict=True)
@@ -167,7 +167,7 @@ def refuse_kept_readings(job, adjustment):
 
 def _initial_readings(survey):
     """Set of (file, row) of all readings at the start of an adjustment."""
-    traces = [one.trace for one in survey.tables.values() if one.trace is not None]
+    traces = [table.trace for table in survey.tables.values() if table.trace is not None]
     return {(trace.file, row) for trace in traces for row in trace.rows}
 
 
@@ -191,5 +191,5 @@ def _not_adjusted(decision, *, is_tried):
 
 
 def _is_from_table(readings, name):
-    """Whether readings come from the file of the table of that name, not from the readings of a bar."""
+    """Whether readings come from the file of that table, not from the readings of a bar."""
     return readings is None or name in readings.file

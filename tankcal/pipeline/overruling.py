@@ -1,7 +1,7 @@
 """Effect of manual decisions: what the search does without them, and how they change the volume.
 
-The job is solved again without any decision, and once without each decision. The volume is not linear
-in the accepted points, so separate solutions are needed. Only volumes are computed.
+The job is solved again without any decision, and once without each decision. The volume is not
+linear in the accepted points, so separate solutions are needed. Only volumes are computed.
 """
 
 from dataclasses import dataclass, replace
@@ -37,8 +37,8 @@ class Overruled:
     w : float
         Normalised residual in that solution; nan if not computed.
     moved_m3 : float
-        Change of the volume at the top of the table due to this decision, m3; nan if not computed or
-        if no valid solution exists without the decision.
+        Change of the volume at the top of the table due to this decision, m3; nan if not computed
+        or if no valid solution exists without the decision.
     """
 
     decision: Overruling
@@ -63,8 +63,8 @@ class Overrulings:
     each : tuple of Overruled
         In the order of the file.
     moved_m3 : float
-        Change of the volume at the top of the table due to all decisions, m3; nan if the search alone
-        gives no valid solution.
+        Change of the volume at the top of the table due to all decisions, m3; nan if the search
+        alone gives no valid solution.
     others : tuple of str
         Points and readings without a decision whose acceptance changes because of the decisions.
     """
@@ -118,7 +118,8 @@ def _is_small(job):
 class _Attempt:
     """Solution of a job with some of its decisions.
 
-    `found` is a `Surveyed`, or None without a valid solution; `volume_m3` is its volume at the level.
+    `found` is a `Surveyed`, or None without a valid solution; `volume_m3` is its volume at the
+    level.
     """
 
     found: object

@@ -1,8 +1,8 @@
 """Upright tank with former radii, some of whose courses were measured again (see `radii_update`).
 
 The new and the former radius of a course are compared under one definition: radius of the mean area
-from joint to joint, inside, shell empty, at the temperature of the former radii. The survey gives this
-radius from a tank of its own, with all its causes of uncertainty.
+from joint to joint, inside, shell empty, at the temperature of the former radii. The survey gives
+this radius from a tank of its own, with all its causes of uncertainty.
 """
 
 from dataclasses import dataclass, replace
@@ -67,8 +67,8 @@ def update_by_survey(job, surveyed):
     Raises
     ------
     SolutionError
-        If the former radii do not explain the new radii, or if the declared shared uncertainty exceeds
-        the uncertainty common to the new radii.
+        If the former radii do not explain the new radii, or if the declared shared uncertainty
+        exceeds the uncertainty common to the new radii.
     """
     measured = measured_courses(job, surveyed)
     measured_radii, radii, change = _radii_by_survey(job, surveyed, measured), job.radii, job.change
@@ -102,6 +102,7 @@ def measured_courses(job, surveyed):
 
 def _radii_by_survey(job, surveyed, measured):
     """`Found` of the measured courses: sqrt(A / pi), with A the mean area from joint to joint."""
+    # No bottom, deadwood, roof or liquid: the radii then describe the empty shell alone.
     job_of_survey = replace(
         job,
         radii=None,

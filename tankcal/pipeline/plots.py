@@ -1,7 +1,7 @@
 """Drawings of a calibrated tank: sections, unrolled wall, capacity table and uncertainty budget.
 
-The functions take plain numbers and return `Drawing`s in the style of `tankcal.pipeline.plot_style`.
-Axis labels come from WORDS, or from `words(key, **values)`.
+The functions take plain numbers and return `Drawing`s in the style of
+`tankcal.pipeline.plot_style`. Axis labels come from WORDS, or from `words(key, **values)`.
 """
 
 import textwrap
@@ -278,8 +278,8 @@ def _unrolled(figure, ax, mappable, words, colours):
 def bottom_rows(area_m2):
     """Number of table rows, from the lowest, that lie in a bottom.
 
-    Above the bottom the cross-section hardly changes. On a common scale with the bottom, differences
-    between courses would be invisible.
+    Above the bottom the cross-section hardly changes. On a common scale with the bottom,
+    differences between courses would be invisible.
 
     Parameters
     ----------
