@@ -47,7 +47,7 @@ class NominalWall(ReadWall):
         return 0.0, 0.0, np.full(len(azimuth_rad), self.radius_m[0])
 
     def factors(self, job, weights):
-        """`Factor`s of the uncertainty of the drawing: common to all courses and of each course."""
+        """`Factor`s of the uncertainty of the drawing: common to all courses and of each."""
         return tuple(
             replace(factor, type="B") for factor in factors_of_readings(self.accepted, weights)
         )

@@ -49,7 +49,7 @@ class Overruled:
 
     @property
     def is_outrageous(self):
-        """Whether the decision keeps a point or reading so discrepant that a warning is required."""
+        """Whether the decision keeps a point or reading so discrepant that a warning is due."""
         far = abs(self.w) > OUTRAGEOUS or abs(self.off_m) > OUTRAGEOUS_M
         return self.decision.is_kept and bool(far)
 
@@ -189,7 +189,7 @@ def _states(surveyed):
 
 
 def _changed(surveyed, by_search, decisions):
-    """Points, then readings, without a decision whose acceptance differs from that by the search alone."""
+    """Undecided points, then readings, whose acceptance differs from that by the search alone."""
     if by_search is None:
         return ()
     decided = {decision.what for decision in decisions}

@@ -130,7 +130,8 @@ def _radii_by_survey(job, surveyed, measured):
     per_m3 = 1 / (2 * np.pi * radius * heights)
     causes = [
         Factor(
-            cause.kind, per_m3[:, None] * of_courses(cause.columns_m3), cause.dof, cause.u, cause.unit,
+            cause.kind, per_m3[:, None] * of_courses(cause.columns_m3), cause.dof, cause.u,
+            cause.unit,
             type=cause.type, note=cause.note, is_default=cause.is_default,
         )
         for cause in body.shell.sources(levels)

@@ -79,8 +79,8 @@ def update_radii(prior_m2, measured, misclosure_m, noise_m2, shared_m=0.0):
 
     Examples
     --------
-    Six courses with uncertainties of 0.7 mm (common) and 0.3 mm (each), a change of 0.8 mm (common) and
-    0.3 mm (each), and one course measured again with 0.5 mm:
+    Six courses with uncertainties of 0.7 mm (common) and 0.3 mm (each), changes of 0.8 mm (common)
+    and 0.3 mm (each), and one course measured again with 0.5 mm:
 
     >>> prior = 1.13 * np.ones((6, 6)) + 0.18 * np.eye(6)
     >>> found = update_radii(prior, np.array([0]), np.array([1.2]), np.array([[0.25]]))

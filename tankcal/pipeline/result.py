@@ -265,7 +265,7 @@ class Result:
         return pandas.DataFrame(columns)
 
     def at(self, height_m: float) -> Quantity:
-        """Volume at a dip with its stated U (`capacity.Quantity`); HeightError outside the table."""
+        """Volume at a dip with its stated U (`capacity.Quantity`); HeightError outside."""
         return stated_volume(self.table, self.intervals, height_m)
 
     def in_service_m3(

@@ -164,7 +164,7 @@ def ship_tables(job, survey, body, table, progress=None):
 
 
 def undeclared_of_ship(job, survey):
-    """Inputs without a standard uncertainty that affect corrections at the largest trim and list."""
+    """Inputs without a standard uncertainty that affect corrections at largest trim and list."""
     if job.ship is None:
         return ()
     trim = max(job.ship.trim_m, key=abs) / job.ship.length_between_marks_m
@@ -203,7 +203,7 @@ def _soundings(job, cells):
 
 
 def _refuse_falling(job, corrections, level):
-    """Raise InputError if a volume falls as its sounding rises, because the mesh intersects itself."""
+    """Raise InputError if a volume falls as its sounding rises: the mesh intersects itself."""
     for cell_result in corrections:
         if np.any(np.diff(cell_result.volume_m3) < -CLOSE * level.capacity_m3):
             expected = message(

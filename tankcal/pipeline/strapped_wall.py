@@ -106,7 +106,7 @@ class TapedWall(ReadWall):
         )
 
     def factors(self, job, weights):
-        """`Factor`s of the uncertainty of features, with derivatives (f, n) by the radii of the readings."""
+        """`Factor`s of the uncertainty of features, with derivatives (f, n) by the readings."""
         used, names = self.accepted, names_of(job.courses or job.rings)
         sees = 1 - np.array([reading.by_inputs.get("plate_thickness", 0.0) for reading in used])
         plates = factors_of_plates(names, self.field, weights * sees, self.plate_sd_m)

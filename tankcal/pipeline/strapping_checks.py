@@ -102,9 +102,13 @@ def strapped_together(wall):
 
 
 def _check_contradictions(straps, together):
-    """Straps that depart from what the points and all other straps show.
+    """Problems of straps that contradict the points and the other straps.
 
-    together  as `strapped_together` found them
+    Parameters
+    ----------
+    straps : Straps
+    together : dict
+        Result of `strapped_together`.
     """
     jointly = {}
     for place, (w, departure) in together.items():
@@ -176,7 +180,7 @@ def check_repeats(straps, table="repeats"):
 
 
 def _check_pairs(job, straps):
-    """A strap that stands far from the others of its course, further than courses taper."""
+    """Problems of straps that differ from the other straps of their course by more than taper."""
     for size, one, count, usual in straps_apart([course.name for course in job.courses], straps):
         template = (
             "the {count} straps of course {course!r} differ by {apart_mm:.1f} mm, those of"
@@ -234,7 +238,7 @@ def straps_apart(names, straps):
 
 
 def _check_courses(job, straps):
-    """Inside radii against the nominal one, and pairs of courses that fit better exchanged."""
+    """Problems of inside radii that differ from the drawing, and of exchanged courses."""
     plates = np.array([course.thickness_m + course.paint_m for course in job.courses])
     inside, names = straps.radius_m - plates, [course.name for course in job.courses]
     nominal, median = nominal_radius_m(job, float(plates[0])), float(np.median(inside))
@@ -332,7 +336,7 @@ def _slope_and_shortness(job, straps, plates_m):
 
 
 def _check_first_course(job, straps):
-    """Its inside diameter against the drawing's, and its circumference against the one declared."""
+    """Problems of the first course against the drawing and the declared circumference."""
     course = job.courses[0]
     plate = course.thickness_m + course.paint_m
     yield from check_side(job, 2 * (straps.radius_m[0] - plate), plate, 0.0)
@@ -354,7 +358,10 @@ def _check_first_course(job, straps):
 
 
 def _check_single_course(job, straps):
-    """A tank whose size the straps of one course alone tell: lines tell the others from it."""
+    """Problem of a tank whose size depends on the straps of a single course.
+
+    The other courses are determined relative to this course by reference lines.
+    """
     strapped = {reduced_strap.strap.course for reduced_strap in straps.reduced}
     if job.lines is None or job.radii is not None or len(strapped) > 1 or is_size_declared(job):
         return
@@ -369,7 +376,7 @@ def _check_single_course(job, straps):
 
 
 def _check_uncontrolled(job, wall):
-    """Courses of one reading alone: a blunder in it nothing would show."""
+    """Problem of courses with a single reading, in which no other reading reveals a blunder."""
     single = read_once([course.name for course in job.courses], wall)
     if single:
         yield _problem(
