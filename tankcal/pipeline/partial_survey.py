@@ -82,9 +82,11 @@ def update_by_survey(job, surveyed):
     causes = [cause.mapped(lambda columns: update.kept @ columns) for cause in former_causes]
     causes += [cause.mapped(lambda columns: update.gain @ columns) for cause in survey_causes]
     if change.shared_m:
-        columns = (update.kept.sum(axis=1) + update.gain.sum(axis=1))[:, None] * change.shared_m
+        shared_columns = (update.kept.sum(axis=1) + update.gain.sum(axis=1))[
+            :, None
+        ] * change.shared_m
         causes = [_less_shared(cause, radii, change.shared_m) for cause in causes]
-        causes.append(Factor(SHARED, columns, u=1000 * change.shared_m, unit="mm", type="B"))
+        causes.append(Factor(SHARED, shared_columns, u=1000 * change.shared_m, unit="mm", type="B"))
     by_inputs = {name: update.gain @ column for name, column in measured_radii.by_inputs.items()}
     wall = wall_of_radii(job, former + update.change_m, causes, by_inputs)
     u_found = np.sqrt(np.diag(measured_radii.noise_m2))

@@ -133,7 +133,7 @@ def fit_scan(job, dof=np.inf):
 
 
 def _refuse_scatter(job, fit, values, used):
-    """Standard deviation of the accepted points about the shape, m; raise InputError if excessive."""
+    """Standard deviation of the accepted points about the shape, m; InputError if excessive."""
     noise = float(np.sqrt(used @ used / max(fit.dof, 1)))
     refuse_misfit(job.points, noise, float(values[0]))
     return noise
@@ -182,7 +182,7 @@ def _covariance(points, index):
 
 
 def _fitted(job, is_used):
-    """Fit, names, values, their derivatives by the unknowns, and the residuals of all points."""
+    """Fit, names, values, their derivatives by the unknowns, and residuals of all points."""
     covariance, xyz = _covariance(job.points, np.flatnonzero(is_used)), job.points.xyz_m
     if job.sphere is not None:
         ball = fit_sphere(xyz[is_used], covariance)

@@ -141,7 +141,7 @@ def distinct_dips(heights_m, breakpoints_m):
     return np.union1d(heights_m, breakpoints_m[distance > SAME_DIP_M])
 
 
-def check_table(job, survey, made, sighting=None):
+def check_table(job, survey, computed, sighting=None):
     """Warnings about a survey and the capacity table computed from it.
 
     Parameters
@@ -149,7 +149,7 @@ def check_table(job, survey, made, sighting=None):
     job : Job
     survey : Wall, Scan, mesh or None
         As passed to `compute_table`.
-    made : ComputedTable
+    computed : ComputedTable
     sighting : Sighting, Touching or Clouded, optional
         For a wall surveyed by reflectorless hits, by tangents or by clouds.
 
@@ -162,10 +162,10 @@ def check_table(job, survey, made, sighting=None):
         survey = survey.surveyed
     return (
         *of_size,
-        *_check_survey(job, survey, made.top_m),
+        *_check_survey(job, survey, computed.top_m),
         *_check_sights(job, survey, sighting),
-        *warn_of_undeclared(_undeclared(job, survey, made.body)),
-        *against_nominal(job.tank, made.table.volume_m3[-1]),
+        *warn_of_undeclared(_undeclared(job, survey, computed.body)),
+        *against_nominal(job.tank, computed.table.volume_m3[-1]),
     )
 
 

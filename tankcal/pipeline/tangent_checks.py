@@ -90,7 +90,7 @@ def judge_tangents(job, wall, touching):
 
 
 def _columns(touching, at):
-    """Derivatives (k, 3) of tangents by the rotation of the circle and displacement of the station."""
+    """Derivatives (k, 3) of tangents by the rotation of the circle and shift of the station."""
     azimuth = touching.normal_rad[at]
     length = np.where(touching.seen_right[at], 1.0, -1.0) * touching.length_m[at]
     return np.column_stack([length, np.sin(azimuth), np.cos(azimuth)])

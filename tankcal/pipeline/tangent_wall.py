@@ -136,17 +136,17 @@ def _hull_of(job, touching, wall):
     the form that the tangents do not show.
     """
     field, joints = wall.field, wall.joints_m
-    height = touching.points.xyz_m[:, 2] - job.datum.bottom_z_m
-    relative_height = np.clip(height / joints[-1], 0.0, 1.0)
+    heights = touching.points.xyz_m[:, 2] - job.datum.bottom_z_m
+    relative_height = np.clip(heights / joints[-1], 0.0, 1.0)
     most_m = max(ROUGHER * _departure_of_limbs(field), LEAST_ROUGH_M)
     unseen_excess = tangent_excess(
         field.amplitudes, field.nominal_m, relative_height, rings_of(field), most_m
     )
-    excess_m, slope_m = np.zeros(len(height)), np.zeros(len(height))
+    excess_m, slope_m = np.zeros(len(heights)), np.zeros(len(heights))
     place, levels = job.tangents.levels
     for number in range(len(levels)):
         is_of_level = place == number
-        height = np.median(height[is_of_level])
+        height = np.median(heights[is_of_level])
         course = int(course_of(height, joints))
         low, high = joints[course : course + 2]
         outline = field.outlines_at([2 * (height - low) / (high - low) - 1])[course, 0]
@@ -190,7 +190,6 @@ def _not_settled(before, after):
 
 def _be_silent(text):
     """Progress callback that does nothing."""
-    pass
 
 
 def _with_points(job, touching):

@@ -184,7 +184,7 @@ def _check_whole_correction(tape, straps):
 
 
 def _check_comparisons(job, straps):
-    """Problem of comparisons with a master that differ more than their standard deviations allow."""
+    """Problem of comparisons with a master that differ beyond their standard deviations."""
     used = [tape for tape, _ in straps.tapes if tape.master]
     strapping = job.strapping if job.great_circles is None else job.great_circles.strapping
     comparisons = [comparison for comparison in strapping.comparisons if comparison.sd_m > 0]

@@ -1,4 +1,4 @@
-"""A lying cylinder of strapped rings: their inside radii, and what is uncertain of them."""
+"""Horizontal cylinder of strapped rings: inside radii and their uncertainty."""
 
 from tankcal.pipeline.tanks.common import inside_end, is_warmed, thermal_scale
 from tankcal.tank.body import SolidPart
@@ -26,7 +26,7 @@ def ringed_part(job, wall, switches):
     )
     features = wall.features_at(lying.dip_from_a_m)
     warmed = is_warmed(job, switches)
-    bears = {
+    is_used = {
         "plate_thickness": switches.plate and any(ring.thickness_m for ring in job.rings),
         "paint": switches.paint and any(ring.paint_m for ring in job.rings),
     }
@@ -39,6 +39,6 @@ def ringed_part(job, wall, switches):
         factors=tuple(
             factor.mapped(lambda columns: scale * columns) for factor in features.factors(job)
         ),
-        unused=tuple(name for name, does in bears.items() if not does),
+        unused=tuple(name for name, is_relevant in is_used.items() if not is_relevant),
         read_with=features.read_with() if warmed else {},
     )
