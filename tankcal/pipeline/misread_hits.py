@@ -42,13 +42,18 @@ def refuse_other_units(hits):
             continue
         factors = product((1.0, GON_IN_DEG, DEG_IN_GON), repeat=2)
         scatter_m = {pair: _scatter(hits, is_of_setup, *pair) for pair in factors}
-        usual = scatter_m[1.0, 1.0] = _scatter(hits, is_of_setup, 1.0, 1.0, is_part_enough=True)
+        scatter_as_read = scatter_m[1.0, 1.0] = _scatter(
+            hits, is_of_setup, 1.0, 1.0, is_part_enough=True
+        )
         best = min(scatter_m, key=scatter_m.get)
-        if usual < LEAST_M:
+        if scatter_as_read < LEAST_M:
             continue
         row = hits.rows[int(np.argmax(is_of_setup))] if hits.rows else None
-        if scatter_m[best] > CLOSER * usual:
-            if _scatter(hits, is_of_setup, 1.0, 1.0, are_horizontal=True) <= CLOSER * usual:
+        if scatter_m[best] > CLOSER * scatter_as_read:
+            if (
+                _scatter(hits, is_of_setup, 1.0, 1.0, are_horizontal=True)
+                <= CLOSER * scatter_as_read
+            ):
                 problems.append(Problem(hits.file, _HORIZONTAL, row, "distance_m"))
             continue
         problems += [
@@ -111,6 +116,7 @@ _HORIZONTAL = message(
 
 
 def _text(factor):
+    """Message that proposes the unit of the given factor."""
     if factor == GON_IN_DEG:
         return message(
             "hits_in_gon", "the hits of the set-up fit a circle if these are gon: is it so?"

@@ -133,6 +133,7 @@ def refuse_misread_zeniths(tangents, poses, touching, zero_z_m):
 
 
 def _text_of_zenith(factor):
+    """Message that proposes the unit of zenith angles of the given factor."""
     if factor == GON_IN_DEG:
         return message(
             "tangent_zeniths_in_gon",
@@ -145,6 +146,7 @@ def _text_of_zenith(factor):
 
 
 def _text(factor):
+    """Message that proposes the unit or sense of directions of the given factor."""
     if factor == GON_IN_DEG:
         return message("tangents_in_gon", "the sights touch one circle if these are gon: is it so?")
     if factor == DEG_IN_GON:

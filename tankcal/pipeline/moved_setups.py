@@ -54,7 +54,7 @@ def moved_setups(field, whole, names, columns, suspect_from, *, wave_m=0.0):
         {set-up: (w, rotation alone in rad, displacement alone (2,) in m)}.
     """
     test = partial(_test_of_movement, columns)
-    return _by_setup(field, whole, names, suspect_from, wave_m, test)[0]
+    return _test_setups(field, whole, names, suspect_from, wave_m, test)[0]
 
 
 def moved_or_ranged(field, whole, names, columns, along, suspect_from, *, wave_m=0.0):
@@ -75,10 +75,10 @@ def moved_or_ranged(field, whole, names, columns, along, suspect_from, *, wave_m
         {set-up: (w, offset of its distances in m)}.
     """
     tests = partial(_test_of_movement, columns), partial(_test_of_distances, along)
-    return _by_setup(field, whole, names, suspect_from, wave_m, *tests)
+    return _test_setups(field, whole, names, suspect_from, wave_m, *tests)
 
 
-def _by_setup(field, whole, names, suspect_from, wave_m, *tests):
+def _test_setups(field, whole, names, suspect_from, wave_m, *tests):
     """Results {set-up: test(mask of its readings, P, P y)} of each test.
 
     The worst set-up of each test is tested again by the other set-ups alone.
@@ -102,9 +102,9 @@ def _by_setup(field, whole, names, suspect_from, wave_m, *tests):
     return tests_by_setup
 
 
-def tested(field, whole, count):
+def tested(field, covariance, count):
     """P and P y of the first `count` readings of a field (see `field.blunders`)."""
-    precision = restricted_precision(whole, free_design(field.sites)[0])
+    precision = restricted_precision(covariance, free_design(field.sites)[0])
     pull = precision @ (field.radius_m - field.radius_m.mean())
     return precision[:count, :count], pull[:count]
 
@@ -155,9 +155,9 @@ def _test_of_movement(columns, is_of_setup, precision, pull):
     columns = columns / scale
     normal, right = columns.T @ precision @ columns, columns.T @ pull
     statistic = float(right @ np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ right)
-    turn = right[0] / max(normal[0, 0], 1e-300) / scale[0]
+    rotation = right[0] / max(normal[0, 0], 1e-300) / scale[0]
     shift = np.linalg.pinv(normal[1:, 1:], rcond=1e-6, hermitian=True) @ right[1:] / scale[1:]
-    return np.sqrt(max(statistic, 0.0)), float(turn), tuple(shift.tolist())
+    return np.sqrt(max(statistic, 0.0)), float(rotation), tuple(shift.tolist())
 
 
 def _test_of_distances(along, is_of_setup, precision, pull):
@@ -177,13 +177,13 @@ def worst_setup(tests):
         Keys setup, w, turn_arcsec and shift_mm; None if no test is significant.
     """
     name = max(tests, key=lambda setup: tests[setup][0])
-    w, turn, shift = tests[name]
+    w, rotation, shift = tests[name]
     if w <= critical_of_setup(len(tests)):
         return None
     return {
         "setup": name,
         "w": w,
-        "turn_arcsec": float(np.degrees(turn) * 3600),
+        "turn_arcsec": float(np.degrees(rotation) * 3600),
         "shift_mm": 1000 * float(np.hypot(*shift)),
     }
 

@@ -174,11 +174,11 @@ def check_size(job, survey):
     if surveyed is None or job.tank.nominal_diameter_m is None:
         return
     plate = float(surveyed.plate_m[0])
-    whole = float(np.median(surveyed.radius_m))
-    miss = departure_of_size(job, whole, plate, float(np.median(surveyed.sd_m)))
+    median_m = float(np.median(surveyed.radius_m))
+    miss = departure_of_size(job, median_m, plate, float(np.median(surveyed.sd_m)))
     if miss:
         if not _has_own_line(job, survey):
-            yield _unlike_drawing(job, whole, miss)
+            yield _unlike_drawing(job, median_m, miss)
         return
     if survey.surveyed_as not in ("wall", "radii") or len(surveyed.names) == 1:
         return
@@ -198,6 +198,7 @@ def _has_own_line(job, survey):
 
 
 def _unlike_drawing(job, radius_m, miss_m):
+    """Problem of a tank whose median diameter differs from the drawing."""
     text = message(
         "points_unlike_drawing",
         "{nominal_m:g} m, but the survey gives {found_m:.4f} m inside, {miss_mm:+.0f} mm from the"
@@ -211,6 +212,7 @@ def _unlike_drawing(job, radius_m, miss_m):
 
 
 def _courses_unlike_drawing(job, names, departures_m):
+    """Problem of single courses whose diameters differ from the drawing."""
     text = message(
         "course_unlike_drawing",
         "{nominal_m:g} m, but the survey gives diameters of courses {courses} up to {miss_mm:+.0f}"

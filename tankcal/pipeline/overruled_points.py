@@ -15,7 +15,7 @@ def decisions_of(job):
     """
     decided, problems = np.zeros(len(job.points.names), dtype=int), []
     place = {name: i for i, name in enumerate(job.points.names)}
-    for decision in _of_points(job):
+    for decision in _point_decisions(job):
         if decision.point in place:
             decided[place[decision.point]] = 1 if decision.is_kept else -1
             continue
@@ -52,7 +52,7 @@ def refuse_kept(job, off_m, most_m, reason=None):
     if reasons_by_name:
         raise InputError(
             Problem(decision.file, reasons_by_name[decision.point], decision.row, "point")
-            for decision in _of_points(job)
+            for decision in _point_decisions(job)
             if decision.point in reasons_by_name
         )
 
@@ -86,7 +86,7 @@ def _why_not(code, off_m, most_m):
     )
 
 
-def _of_points(job):
+def _point_decisions(job):
     """Decisions of a job about points, not readings."""
     return [decision for decision in job.overrulings if decision.table is None]
 
@@ -121,7 +121,7 @@ def with_decided_readings(measurements, overrulings):
 
     tables = [(reading, reading.table) for reading in measurements.readings]
     tables.append((measurements.image_points, "image_points"))
-    kept = {
+    kept_keys = {
         (readings.file, row)
         for readings, name in tables
         if readings is not None and _is_from_table(readings, name)
@@ -132,7 +132,7 @@ def with_decided_readings(measurements, overrulings):
         for readings, name in tables
     )
     return replace(
-        measurements, readings=tuple(readings), image_points=images, kept=frozenset(kept)
+        measurements, readings=tuple(readings), image_points=images, kept=frozenset(kept_keys)
     )
 
 

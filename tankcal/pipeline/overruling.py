@@ -50,8 +50,8 @@ class Overruled:
     @property
     def is_outrageous(self):
         """Whether the decision keeps a point or reading so discrepant that a warning is due."""
-        far = abs(self.w) > OUTRAGEOUS or abs(self.off_m) > OUTRAGEOUS_M
-        return self.decision.is_kept and bool(far)
+        is_discrepant = abs(self.w) > OUTRAGEOUS or abs(self.off_m) > OUTRAGEOUS_M
+        return self.decision.is_kept and bool(is_discrepant)
 
 
 @dataclass(frozen=True)
@@ -129,14 +129,14 @@ class _Attempt:
     def of(cls, job, decisions, level_m):
         """Solve a job with the given decisions only."""
         try:
-            found = find_survey(replace(job, overrulings=decisions), lambda text: None)
+            surveyed = find_survey(replace(job, overrulings=decisions), lambda text: None)
             if job.liquid is None:
-                body = body_of(found.job, found.survey, uncertain=False)
+                body = body_of(surveyed.job, surveyed.survey, uncertain=False)
             else:
                 from tankcal.pipeline.liquid import measure_by_liquid
 
-                body = measure_by_liquid(found.job, found.survey).body
-            return cls(found, float(body.volume_m3(np.array([level_m]))[0]))
+                body = measure_by_liquid(surveyed.job, surveyed.survey).body
+            return cls(surveyed, float(body.volume_m3(np.array([level_m]))[0]))
         except (InputError, SolutionError, HeightError):
             return cls(None, np.nan)
 
@@ -145,14 +145,14 @@ class _Attempt:
         if self.found is None:
             return NO_SOLUTION, np.nan, np.nan
         if decision.table is not None:
-            return self._of_reading(decision)
+            return self._state_of_reading(decision)
         points = self.found.job.points
         names = () if points is None else points.names
         if decision.point not in names:
             return NO_SOLUTION, np.nan, np.nan
         return _states(self.found)[names.index(decision.point)]
 
-    def _of_reading(self, decision):
+    def _state_of_reading(self, decision):
         """Result of the search for the reading of a decision, like `says`."""
         file = _file_of(self.found.job.measurements, decision.table)
         readings = self.found.adjustment.readings
@@ -182,9 +182,9 @@ def _states(surveyed):
     if hasattr(wall, "shell"):
         shell = wall.shell
         return list(zip(shell.reason, shell.residual_m.tolist(), shell.w.tolist(), strict=True))
-    used = np.isin(np.arange(len(wall.residuals_m)), wall.accepted)
+    is_used = np.isin(np.arange(len(wall.residuals_m)), wall.accepted)
     w = wall.residuals_m / wall.noise_m
-    reason = np.where(used, "", "far_off").tolist()
+    reason = np.where(is_used, "", "far_off").tolist()
     return list(zip(reason, wall.residuals_m.tolist(), w.tolist(), strict=True))
 
 
@@ -196,7 +196,7 @@ def _changed(surveyed, by_search, decisions):
     changed = []
     if surveyed.job.points is not None and by_search.job.points.names == surveyed.job.points.names:
         states = zip(surveyed.job.points.names, _states(surveyed), _states(by_search), strict=True)
-        changed += [name for name, (now, *_), (before, *_) in states if now != before]
+        changed += [name for name, (now, *_), (former, *_) in states if now != former]
     if surveyed.adjustment is not None:
         changed += sorted(_removed(surveyed.adjustment) ^ _removed(by_search.adjustment))
     return tuple(name for name in changed if name not in decided)
@@ -215,9 +215,9 @@ def warn_of_overrulings(job, overrulings):
     if overrulings is None:
         return ()
     problems = [
-        Problem(one.decision.file, _outrageous(one), one.decision.row, "decision")
-        for one in overrulings.each
-        if one.is_outrageous
+        Problem(effect.decision.file, _outrageous(effect), effect.decision.row, "decision")
+        for effect in overrulings.each
+        if effect.is_outrageous
     ]
     if overrulings.others:
         text = message(

@@ -75,7 +75,7 @@ def update_by_survey(job, surveyed):
     former = np.where(radii.is_known, radii.radius_m, job.tank.nominal_diameter_m / 2)
     former_causes = _former_causes(radii, change)
     prior = sum(cause.columns @ cause.columns.T for cause in former_causes)
-    survey_causes = _without_shared(measured_radii.causes, change.shared_m)
+    survey_causes = _subtract_shared(measured_radii.causes, change.shared_m)
     misclosure = measured_radii.radius_m - former[measured]
     update = update_radii(prior, measured, misclosure, measured_radii.noise_m2, change.shared_m)
     _refuse_surprise(job, update)
@@ -148,7 +148,7 @@ def _radii_by_survey(job, surveyed, measured):
         for name in declared
         if name in derivatives and name not in NO_MEANING
     }
-    by_inputs = {name: one for name, one in by_inputs.items() if np.any(one)}
+    by_inputs = {name: column for name, column in by_inputs.items() if np.any(column)}
     noise = sum(cause.columns @ cause.columns.T for cause in causes)
     for name, column in by_inputs.items():
         noise = noise + declared[name] ** 2 * np.outer(column, column)
@@ -160,22 +160,22 @@ def _significant_causes(causes):
     least_column_m = LEAST * max(np.abs(cause.columns).max(initial=0.0) for cause in causes)
     causes = [cause for cause in causes if np.abs(cause.columns).max(initial=0.0) > least_column_m]
     form_causes = [cause for cause in causes if cause.kind in KINDS]
-    others = tuple(cause for cause in causes if cause.kind not in KINDS)
+    other_causes = tuple(cause for cause in causes if cause.kind not in KINDS)
     if not form_causes:
-        return others
+        return other_causes
     columns = np.hstack([cause.columns for cause in form_causes])
     type_ = "B" if any(cause.type == "B" for cause in form_causes) else "A"
-    return (*others, Factor(FORM, columns, type=type_))
+    return (*other_causes, Factor(FORM, columns, type=type_))
 
 
 def _former_causes(radii, change):
     """`Factor`s of the former radii and of their change since."""
     count, unknown = len(radii.radius_m), np.flatnonzero(~radii.is_known)
-    common, own = causes_of(radii)
-    wide = np.hstack([own.columns, UNKNOWN_M * np.eye(count)[:, unknown]])
+    common, separate = causes_of(radii)
+    columns = np.hstack([separate.columns, UNKNOWN_M * np.eye(count)[:, unknown]])
     return (
         common,
-        replace(own, columns=wide),
+        replace(separate, columns=columns),
         Factor(
             CHANGE_COMMON, np.full((count, 1), change.common_m), u=1000 * change.common_m,
             unit="mm", type="B",
@@ -191,18 +191,18 @@ def _less_shared(cause, radii, shared_m):
     return cause.mapped(lambda columns: columns * np.sqrt(1 - (shared_m / radii.u_common_m) ** 2))
 
 
-def _without_shared(causes, shared_m):
+def _subtract_shared(causes, shared_m):
     """Causes of the survey without the shared part of all courses: F F' - shared^2 1 1'.
 
     With F a = shared 1 the remainder is F (I - a a')^(1/2).
     """
     if not shared_m:
         return causes
-    whole = np.hstack([cause.columns for cause in causes])
-    shared = np.full(len(whole), shared_m)
-    a = np.linalg.lstsq(whole, shared, rcond=None)[0]
+    columns = np.hstack([cause.columns for cause in causes])
+    shared = np.full(len(columns), shared_m)
+    a = np.linalg.lstsq(columns, shared, rcond=None)[0]
     norm2 = float(a @ a)
-    if norm2 > 1 or not np.allclose(whole @ a, shared, rtol=1e-6):
+    if norm2 > 1 or not np.allclose(columns @ a, shared, rtol=1e-6):
         raise SolutionError(
             message(
                 "shared_beyond_survey",
@@ -212,10 +212,10 @@ def _without_shared(causes, shared_m):
                 most=1000 * shared_m / np.sqrt(norm2),
             )
         )
-    remaining = whole - (1 - np.sqrt(1 - norm2)) / norm2 * np.outer(whole @ a, a)
+    remaining = columns - (1 - np.sqrt(1 - norm2)) / norm2 * np.outer(columns @ a, a)
     ends = np.cumsum([cause.columns.shape[1] for cause in causes])[:-1]
     parts = np.split(remaining, ends, axis=1)
-    return tuple(replace(one, columns=part) for one, part in zip(causes, parts, strict=True))
+    return tuple(replace(cause, columns=part) for cause, part in zip(causes, parts, strict=True))
 
 
 def _refuse_surprise(job, update):

@@ -110,6 +110,7 @@ def residual_panels(rings, words=english_label, most=8):
 
 @styled
 def _residual_panels(rings, limit_mm, words):
+    """Figure with one panel of residuals per section, all with the same limits."""
     figure = Drawing(figsize=(WIDTH, 0.55 * len(rings) + 0.55))
     axes = figure.subplots(len(rings), 1, sharex=True, squeeze=False)[:, 0]
     for ax, ring in zip(axes, rings, strict=True):
@@ -162,6 +163,7 @@ def polar(rings, words=english_label, most=12):
 
 @styled
 def _polar_panels(rings, factor, words):
+    """Figure of sections about their circles, with a common enlargement."""
     columns = 3 if len(rings) <= 6 else 4
     rows = ceil(len(rings) / columns)
     figure = Drawing(figsize=(WIDTH, 5.4 / columns * rows))

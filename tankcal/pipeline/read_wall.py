@@ -61,9 +61,9 @@ class ReadWall:
             Minimal detectable bias of the radius, m; infinite if uncontrolled.
         accepted : ndarray of bool
         """
-        chosen, tested = self.are(kind), self.tested
+        is_of_kind, tested = self.are(kind), self.tested
         w = np.where(np.isfinite(tested.sd_m), tested.w, np.nan)
-        return w[chosen], noncentrality() * tested.sd_m[chosen], tested.accepted[chosen]
+        return w[is_of_kind], noncentrality() * tested.sd_m[is_of_kind], tested.accepted[is_of_kind]
 
     @property
     def accepted(self):
@@ -83,7 +83,7 @@ class ReadWall:
 
             kappa = u^2 c' P y,   variance u^2 - u^4 c' P c.
         """
-        collimations, used = {}, self.accepted
+        collimations, accepted = {}, self.accepted
         unknowns = columns_of(
             [reading.free for reading in self.readings]
         )  # the last of `Sites.shared`
@@ -91,8 +91,8 @@ class ReadWall:
             if kind == "collimation":
                 values, covariance = self.field.shared
                 collimations[name] = float(values[index]), float(np.sqrt(covariance[index, index]))
-        precision, points = None, len(self.field.radius_m) - len(used)
-        for (kind, name), (_, _, column) in shared_effects(used).items():
+        precision, points = None, len(self.field.radius_m) - len(accepted)
+        for (kind, name), (_, _, column) in shared_effects(accepted).items():
             if kind != "collimation":
                 continue
             if precision is None:
@@ -100,7 +100,7 @@ class ReadWall:
                 precision = restricted_precision(self.field.covariance_m2, design)
             u = next(
                 reading.effects[kind, name][0]
-                for reading in used
+                for reading in accepted
                 if (kind, name) in reading.effects
             )
             # Arc seconds to radians; zeros for the readings of points, which precede these

@@ -218,8 +218,8 @@ class Result:
     @property
     def accepted(self) -> np.ndarray | None:
         """(m,) indices of the points that are of the wall; None where none were surveyed."""
-        found = self.wall or self.scan
-        return None if found is None else found.accepted
+        survey = self.wall or self.scan
+        return None if survey is None else survey.accepted
 
     @property
     def gross(self) -> ShellVolume | None:

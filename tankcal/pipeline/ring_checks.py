@@ -55,14 +55,14 @@ def _check_pairs(job, straps):
             " by {usual_mm:.1f} mm: is one of them misread, over an obstruction or not square to"
             " the axis?"
         )
-        ring, apart, least = strap.strap.course, 1000 * size, 1000 * typical
+        ring, apart_mm, least = strap.strap.course, 1000 * size, 1000 * typical
         if size > FAR_LIMITS * limit_of_repeats(strap.circumference_m, LIMITS):
             text = message(
                 "strap_of_ring_far",
                 template,
                 count=count,
                 ring=ring,
-                apart_mm=apart,
+                apart_mm=apart_mm,
                 usual_mm=least,
             )
         else:
@@ -71,7 +71,7 @@ def _check_pairs(job, straps):
                 template,
                 count=count,
                 ring=ring,
-                apart_mm=apart,
+                apart_mm=apart_mm,
                 usual_mm=least,
             )
         yield _problem(text, strap.strap.row)
@@ -143,9 +143,11 @@ def _steps_of_laps(inside_m, thickness_m, outer):
     steps = []
     for i in range(len(outer) - 1):
         if outer[i] != outer[i + 1]:
-            wide, narrow = (i, i + 1) if outer[i] else (i + 1, i)
-            if thickness_m[narrow] > 0:
-                steps.append((inside_m[wide] - inside_m[narrow]) / thickness_m[narrow])
+            outer_ring, inner_ring = (i, i + 1) if outer[i] else (i + 1, i)
+            if thickness_m[inner_ring] > 0:
+                steps.append(
+                    (inside_m[outer_ring] - inside_m[inner_ring]) / thickness_m[inner_ring]
+                )
     return float(np.mean(steps)) if steps else 0.0
 
 
@@ -193,7 +195,7 @@ def exchanged_rings(outside_m, plates_m, thickness_m, laps):
         return []
     exchanged = [exchanged_courses(outside_m, plates_m + shift, range(count)) for shift in shifts]
     exchanged = [result for result in exchanged if result is not None]
-    least = min((left for _, _, left, _ in exchanged), default=0.0)
+    least = min((sum_m for _, _, sum_m, _ in exchanged), default=0.0)
     limit = least + FITS * float(np.median(thickness_m))
     return list({result[:2]: result for result in exchanged if result[2] <= limit}.values())
 

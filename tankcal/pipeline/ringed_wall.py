@@ -68,19 +68,23 @@ class RingFeatures:
         )
         low, high = wall.joints_m[self._zero], wall.joints_m[self._zero + 1]
         self._means = wall.field.means
-        self._of_levels = self._from_levels(2 * (dip_from_a_m - low) / (high - low) - 1)
+        self._of_levels = self._weights_of_levels(2 * (dip_from_a_m - low) / (high - low) - 1)
 
     def factors(self, job):
         """`Factor`s of the uncertainty that the tape leaves in the features."""
-        read = self._wall.factors(job, self._of_levels @ self._means.weights)
-        return (*map(self._padded, read), *self._of_bulges(), *self._of_waves())
+        factors_of_tape = self._wall.factors(job, self._of_levels @ self._means.weights)
+        return (
+            *map(self._padded, factors_of_tape),
+            *self._factors_of_bulges(),
+            *self._factors_of_waves(),
+        )
 
     def read_with(self):
         """Derivatives (features,) by inputs, such as the temperature of the shell and tape."""
         by_inputs = self._wall.read_with(self._of_levels @ self._means.weights)
         return {name: self._with_waves(column) for name, column in by_inputs.items()}
 
-    def _from_levels(self, zeta):
+    def _weights_of_levels(self, zeta):
         """Weights (rings + 1, rings * LEVELS) of radii at the Gauss heights.
 
         The first rows give the mean radius of each ring. The last row gives the difference between
@@ -88,11 +92,11 @@ class RingFeatures:
         """
         share, nodes = panels([0.0, 1.0], LEVELS)[1], gauss_heights()
         weights = np.kron(np.vstack([np.eye(self._rings), np.zeros(self._rings)]), share)
-        others = [np.delete(nodes, j) for j in range(LEVELS)]
+        nodes_without_j = [np.delete(nodes, j) for j in range(LEVELS)]
         # Lagrange polynomials through the Gauss heights, evaluated at zeta.
         interpolation = [
             np.prod((zeta - other_nodes) / (node - other_nodes))
-            for node, other_nodes in zip(nodes, others, strict=True)
+            for node, other_nodes in zip(nodes, nodes_without_j, strict=True)
         ]
         columns = slice(self._zero * LEVELS, (self._zero + 1) * LEVELS)
         weights[-1, columns] = interpolation - share
@@ -100,24 +104,24 @@ class RingFeatures:
 
     def _with_waves(self, rows):
         """Append zero rows for the waves, which a tape does not show."""
-        more = ((0, self._rings * len(WAVES)), *((0, 0),) * (np.ndim(rows) - 1))
-        return np.pad(rows, more)
+        padding = ((0, self._rings * len(WAVES)), *((0, 0),) * (np.ndim(rows) - 1))
+        return np.pad(rows, padding)
 
     def _padded(self, factor):
         return factor.mapped(self._with_waves)
 
-    def _of_bulges(self):
+    def _factors_of_bulges(self):
         """`Factor` of the variation of the mean radius along rings between the straps."""
         assumed = self._wall.field.amplitudes.assumed_share()
-        chosen = [i for i, component in enumerate(COMPONENTS) if component.shape == "mean"]
+        indices = [i for i, component in enumerate(COMPONENTS) if component.shape == "mean"]
         weights = self._of_levels
-        parts = [weights @ self._means.unseen(i) @ weights.T for i in chosen]
+        parts = [weights @ self._means.unseen(i) @ weights.T for i in indices]
         factor = factor_of_unseen(
-            "bulge", parts, [np.trace(part) for part in parts], assumed[chosen]
+            "bulge", parts, [np.trace(part) for part in parts], assumed[indices]
         )
         return (self._padded(factor),) if factor.columns.shape[1] else ()
 
-    def _of_waves(self):
+    def _factors_of_waves(self):
         """`Factor`s of the deviations from a circle, of declared size."""
         shape = self._wall.shape_sd_m
         if not shape:
@@ -161,8 +165,8 @@ def _shares_of_waves():
     for component in COMPONENTS:
         if component.shape in KIND_OF_WAVES:
             sizes[component.shape, component.common] += component.median_m**2
-    whole = sum(sizes.values())
-    return {key: size / whole for key, size in sizes.items()}
+    total = sum(sizes.values())
+    return {key: size / total for key, size in sizes.items()}
 
 
 def find_ringed_wall(job, progress, amplitudes=None):

@@ -132,9 +132,9 @@ def fit_scan(job, dof=np.inf):
     )
 
 
-def _refuse_scatter(job, fit, values, used):
+def _refuse_scatter(job, fit, values, residuals):
     """Standard deviation of the accepted points about the shape, m; InputError if excessive."""
-    noise = float(np.sqrt(used @ used / max(fit.dof, 1)))
+    noise = float(np.sqrt(residuals @ residuals / max(fit.dof, 1)))
     refuse_misfit(job.points, noise, float(values[0]))
     return noise
 

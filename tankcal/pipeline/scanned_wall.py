@@ -125,7 +125,7 @@ def scanned_wall(job, fitted, chosen, covariance_m2, dof):
         covariance = amplitudes.noise * weights @ readings.noise_m2 @ weights.T
         return survey_factors(covariance, dof, causes, [weights @ column for column in moves])
 
-    factors = (*of_points(rows), *_of_the_unseen(field, estimate, rows))
+    factors = (*of_points(rows), *_factors_of_unseen(field, estimate, rows))
     form = SurveyedForm.of_volumes(
         solid.volume_m3(levels),
         area,
@@ -140,8 +140,8 @@ def scanned_wall(job, fitted, chosen, covariance_m2, dof):
 
 
 def _field(readings, estimated):
-    given = readings.places, readings.design, readings.distance_m, readings.noise_m2
-    return SolidField(*given, estimate_sizes(*given, estimate_noise=estimated))
+    arguments = readings.places, readings.design, readings.distance_m, readings.noise_m2
+    return SolidField(*arguments, estimate_sizes(*arguments, estimate_noise=estimated))
 
 
 def agreeing(job, fit, chosen, covariance_m2, limit, kept):
@@ -186,8 +186,8 @@ def _unlike_neighbours(job, fit, index, limit):
     """Indices of points far from the median of their neighbours."""
     xyz = job.points.xyz_m[index]
     distance = offsets(fit, xyz)
-    near = scipy.spatial.KDTree(xyz).query(xyz, NEIGHBOURS + 1)[1][:, 1:]
-    deviation = np.abs(distance - np.median(distance[near], axis=1))
+    neighbours = scipy.spatial.KDTree(xyz).query(xyz, NEIGHBOURS + 1)[1][:, 1:]
+    deviation = np.abs(distance - np.median(distance[neighbours], axis=1))
     return np.flatnonzero(deviation > max(limit * SCALE_OF_MEDIAN * np.median(deviation), DENT_M))
 
 
@@ -198,22 +198,37 @@ def offsets(fit, xyz_m):
     return np.linalg.norm(xyz_m - fit.centre_m, axis=1) - fit.radius_m
 
 
-def _of_the_unseen(field, estimated, rows):
+def _factors_of_unseen(field, estimated, rows):
     """`Factor`s of each kind of deviation that the points do not fully determine."""
     assumed, factors = field.amplitudes.assumed_share(), []
     for kind in KINDS:
-        chosen = [
+        indices = [
             i for i, departure in enumerate(field.places.departures) if departure.kind == kind
         ]
-        if not chosen:
+        if not indices:
             continue
-        parts = [estimated.unseen[i][rows, rows] for i in chosen]
+        parts = [estimated.unseen[i][rows, rows] for i in indices]
         sizes = [np.trace(part) for part in parts]
-        factors.append(factor_of_unseen(kind, parts, sizes, assumed[chosen]))
+        factors.append(factor_of_unseen(kind, parts, sizes, assumed[indices]))
     return tuple(factor for factor in factors if factor.columns.shape[1])
 
 
 def _readings(job, fit, chosen, covariance_m2):
+    """`_Readings` of the accepted points, as means of neighbours.
+
+    Parameters
+    ----------
+    job : Job
+    fit : sphere or cylinder
+    chosen : ndarray of int, shape (m,)
+        Indices of the accepted points.
+    covariance_m2 : ndarray, shape (3m, 3m) or (3m,)
+        Covariance or variances of these points, m2.
+
+    Returns
+    -------
+    _Readings
+    """
     xyz = job.points.xyz_m[chosen]
     means = means_of_neighbours(xyz)
     if isinstance(fit, FittedCylinder):
@@ -221,8 +236,8 @@ def _readings(job, fit, chosen, covariance_m2):
         frame = np.vstack([fit.tangents, fit.direction])
         unknowns = np.array([0.0, 0.0, 0.0, 0.0, fit.radius_m])
         distance, by_unknowns, normal = cylinder_distances(frame)(unknowns, local)
-        turn, along = _on_cylinder(job, fit, means @ xyz)
-        places = OnCylinder(fit.radius_m, turn, along)
+        angle, along = _on_cylinder(job, fit, means @ xyz)
+        places = OnCylinder(fit.radius_m, angle, along)
     else:
         unknowns = np.append(fit.centre_m, fit.radius_m)
         distance, by_unknowns, normal = sphere_distances(unknowns, xyz)
@@ -245,10 +260,10 @@ def _on_cylinder(job, fit, xyz_m):
     azimuth = job.horizontal.azimuth_rad
     sign = np.sign(fit.direction[:2] @ (np.sin(azimuth), np.cos(azimuth)))
     relative = xyz_m - fit.point_m
-    up = np.array([0.0, 0.0, 1.0]) - fit.direction[2] * fit.direction
-    up = up / np.linalg.norm(up)
-    across = np.cross(fit.direction, up)
-    return np.arctan2(relative @ across, -(relative @ up)), sign * (relative @ fit.direction)
+    upward = np.array([0.0, 0.0, 1.0]) - fit.direction[2] * fit.direction
+    upward = upward / np.linalg.norm(upward)
+    across = np.cross(fit.direction, upward)
+    return np.arctan2(relative @ across, -(relative @ upward)), sign * (relative @ fit.direction)
 
 
 def _dip_along(solid, along_m):
@@ -263,8 +278,8 @@ def _nearest_to_foot(job, fit, solid, xyz_m):
     """
     if not isinstance(fit, FittedCylinder):
         return None
-    turn, along = _on_cylinder(job, fit, xyz_m)
-    distance = np.hypot(fit.radius_m * turn, along - _dip_along(solid, along))
+    angle, along = _on_cylinder(job, fit, xyz_m)
+    distance = np.hypot(fit.radius_m * angle, along - _dip_along(solid, along))
     return float(distance.min())
 
 

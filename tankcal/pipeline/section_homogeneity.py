@@ -139,6 +139,7 @@ def _rejected_by_holm(p):
 
 
 def _test_of(section, noise, p, differs):
+    """`SectionTest` of a section."""
     circle = section.circle
     return SectionTest(
         section=section.group.name,

@@ -90,19 +90,19 @@ class ShapeBase:
                 self._add(spots, high, angle, self._reading_near(levels[high], angle))
         self._count = len(spots)
         self._centre_of = {i: number for number, i in enumerate(plumbed)}
-        at, angle, site = map(np.array, zip(*spots, strict=True))
+        level_of_spot, angle, site = map(np.array, zip(*spots, strict=True))
         self._site = site
         sites = wall.field.sites
-        zeta = np.array([level.zeta for level in levels])[at]
+        zeta = np.array([level.zeta for level in levels])[level_of_spot]
         spots = Spots(
-            course=np.array([level.course for level in levels])[at],
+            course=np.array([level.course for level in levels])[level_of_spot],
             zeta=np.where(site >= 0, sites.zeta[site], zeta),
             azimuth_rad=np.where(site >= 0, sites.azimuth_rad[site], angle),
             site=site,
         )
         rings = [(levels[i].ring, levels[i].zeta) for i in plumbed]
         self._found = FieldValues(wall.field, spots, rings)
-        self._height_m = np.array([level.height_m for level in levels])[at]
+        self._height_m = np.array([level.height_m for level in levels])[level_of_spot]
         inset = np.array(insets_of(job, job.switches))[spots.course]
         self._head_m, self.state = self._widening()
         self._surveyed = self._found.value_m.copy()
@@ -138,9 +138,13 @@ class ShapeBase:
     def centre(self, level):
         """Position (x, y) of the centre of a level in the frame of the survey, m."""
         chosen, wall = self._levels[level], self._wall
-        at = self._count + 2 * self._centre_of[level]
-        up = chosen.height_m - wall.sections[chosen.ring].group.height_m
-        return wall.origins_m[chosen.ring] + self._surveyed[at : at + 2] + up * self._slope
+        column = self._count + 2 * self._centre_of[level]
+        height_above = chosen.height_m - wall.sections[chosen.ring].group.height_m
+        return (
+            wall.origins_m[chosen.ring]
+            + self._surveyed[column : column + 2]
+            + height_above * self._slope
+        )
 
     def radii(self, level, azimuth):
         """Rows (a, f) that select the radii of a level."""
@@ -155,8 +159,8 @@ class ShapeBase:
         direction = np.column_stack([np.sin(azimuth), np.cos(azimuth)])
         rows = self.radii(high, azimuth) - self.radii(low, azimuth)
         for level, sign in ((high, 1.0), (low, -1.0)):
-            at = self._count + 2 * self._centre_of[level]
-            rows[:, at : at + 2] += sign * direction
+            column = self._count + 2 * self._centre_of[level]
+            rows[:, column : column + 2] += sign * direction
         return rows
 
     def is_read(self, low, high):
@@ -169,8 +173,8 @@ class ShapeBase:
         """Rows (3, f) of x and y between the centres of two levels, and of their distance."""
         rows = np.zeros((3, len(self._value_m)))
         for level, sign in ((high, 1.0), (low, -1.0)):
-            at = self._count + 2 * self._centre_of[level]
-            rows[:2, at : at + 2] += sign * np.eye(2)
+            column = self._count + 2 * self._centre_of[level]
+            rows[:2, column : column + 2] += sign * np.eye(2)
         between = self.centre(high) - self.centre(low)
         distance = np.hypot(*between)
         # The distance changes only by displacements along the line between the centres.
@@ -223,12 +227,12 @@ class ShapeBase:
         for name, column in self._wall.read_with(self._found.weights).items():
             if name in bearing:
                 derivatives[name] = derivatives.get(name, 0.0) + column
-        for name, column in self._by_head().items():
+        for name, column in self._derivatives_of_head().items():
             full = np.append(column, np.zeros(len(self._value_m) - count))
             derivatives[name] = derivatives.get(name, 0.0) + full
         return derivatives
 
-    def _by_head(self):
+    def _derivatives_of_head(self):
         """{input: derivative (p,) of the subtracted head}.
 
         The head is K rho (h - z), with K proportional to 1 / (E t).

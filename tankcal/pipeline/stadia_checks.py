@@ -27,7 +27,7 @@ def check_bases(measurements):
                 row = table.rows[i] if table.rows else None
                 reading = table.start[i], float(table.value[i]), row, table.file, float(table.sd[i])
                 bases.setdefault(key, []).append(reading)
-    return tuple(chain.from_iterable(_of_base(*item) for item in bases.items()))
+    return tuple(chain.from_iterable(_check_base(*item) for item in bases.items()))
 
 
 def check_rejected_bases(measurements, readings):
@@ -65,7 +65,7 @@ def check_rejected_bases(measurements, readings):
             yield Problem(rejected.file, text, rejected.row, "to")
 
 
-def _of_base(ends, readings):
+def _check_base(ends, readings):
     """`Problem`s of one base, from its readings (start, length, row, file, standard deviation)."""
     starts, lengths, rows, files, sds = zip(*readings, strict=True)
     if len(set(starts)) < 2:

@@ -124,8 +124,8 @@ def stated_volume(table, intervals, height_m):
     U = Printed(intervals.U_m3, intervals.by_gum).of(table, None, height_m, quantity.U_m3)
     if len(rows) == 1:
         ends = float(intervals.low_m3[rows[0]]), float(intervals.high_m3[rows[0]])
-        return _by_monte_carlo(quantity, U, ends)
-    return quantity if quantity.U_m3 == U else _by_monte_carlo(quantity, U, None)
+        return _replace_interval(quantity, U, ends)
+    return quantity if quantity.U_m3 == U else _replace_interval(quantity, U, None)
 
 
 def stated_delivery(table, simulation, low_m, high_m):
@@ -162,10 +162,10 @@ def stated_delivery(table, simulation, low_m, high_m):
     if of_delivered.by_gum[place]:
         return quantity
     ends = float(of_delivered.low_m3[place]), float(of_delivered.high_m3[place])
-    return _by_monte_carlo(quantity, float(of_delivered.U_m3[place]), ends)
+    return _replace_interval(quantity, float(of_delivered.U_m3[place]), ends)
 
 
-def _by_monte_carlo(quantity, U_m3, ends_m3):
+def _replace_interval(quantity, U_m3, ends_m3):
     """Replace U and interval of a quantity by those of the Monte Carlo method."""
     return replace(quantity, k=None, U_m3=U_m3, interval="monte_carlo", ends_m3=ends_m3)
 
@@ -214,8 +214,10 @@ def _worst(job, table):
     """
     height = float(np.ptp(table.height_m))
     worst_by_height = {
-        one: worst_deliveries(table, min(one, height) if one <= round(height, 3) else one)
-        for one in _minima(job)
+        height_m: worst_deliveries(
+            table, min(height_m, height) if height_m <= round(height, 3) else height_m
+        )
+        for height_m in _minima(job)
     }
     if job.table.minimum_delivery_m is not None:
         problems = [
@@ -225,12 +227,12 @@ def _worst(job, table):
                     "no_such_delivery",
                     "found {one:g}; expected at most {height:g} m: no two usable dips of the "
                     "table are further apart",
-                    one=one,
+                    one=height_m,
                     height=height,
                 ),
                 column="table.minimum_delivery_m",
             )
-            for one, worst in worst_by_height.items()
+            for height_m, worst in worst_by_height.items()
             if worst is None
         ]
         if problems:

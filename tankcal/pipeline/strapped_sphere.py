@@ -91,9 +91,9 @@ class StrappedSphere:
         The value is nan if no other circle controls the reading.
         """
         diagonal = np.diag(self.fit.precision)
-        whole = np.diag(np.linalg.inv(self._lengths_m2))
+        covariance_diagonal = np.diag(np.linalg.inv(self._lengths_m2))
         pull = -self.fit.precision @ self.fit.residuals_m
-        is_determined = diagonal > 1e-6 * whole
+        is_determined = diagonal > 1e-6 * covariance_diagonal
         return np.where(
             is_determined, pull / np.sqrt(np.where(is_determined, diagonal, 1.0)), np.nan
         )
@@ -101,13 +101,13 @@ class StrappedSphere:
     def sd_of_check_m(self, place):
         """Standard deviation of the difference between a check reading and the ellipsoid, m."""
         azimuth = self.azimuth_rad[place : place + 1]
-        _, by = great_circle_lengths(self.fit.unknowns, azimuth)
+        _, derivative = great_circle_lengths(self.fit.unknowns, azimuth)
         place_of_check = OnGreatCircles(self.places.radius_m, _normals(azimuth))
         form = FULL_TURN**2 * _parts(place_of_check, self.variances_m2).sum(axis=0)
         reading = self.reduced[place]
         shared = sum(effect.by_m**2 for effect in reading.effects)
-        of_fit = by @ self.fit.weights
-        prior = by @ self.fit.by_prior
+        of_fit = derivative @ self.fit.weights
+        prior = derivative @ self.fit.by_prior
         variance = form + of_fit @ self._lengths_m2 @ of_fit.T + prior @ prior.T
         return float(np.sqrt(variance[0, 0] + reading.sd_m**2 + shared))
 
@@ -130,8 +130,8 @@ class StrappedSphere:
         weights = FULL_TURN * by_lengths  # by mean radii
         factors = (
             *factors_of_readings(self.readings, weights),
-            *self._beyond(solid, levels, weights),
-            *self._not_told(solid, levels),
+            *self._factors_of_form(solid, levels, weights),
+            *self._factors_of_prior(solid, levels),
         )
         none = np.zeros(len(levels))
         form = SurveyedForm.of_volumes(
@@ -149,22 +149,28 @@ class StrappedSphere:
             [*(by_product * 2 * coefficient for coefficient in (mean, -cos, -sin)), of_c]
         )
 
-    def _beyond(self, solid, levels, weights):
+    def _factors_of_form(self, solid, levels, weights):
         """`Factor` of each kind of deviation beyond degree 2."""
         volumes = cap_volumes(levels, solid.area_m2(levels), solid.top_m / 2)
         for kind in dict.fromkeys(departure.kind for departure in self.places.departures):
-            whole = 0.0
+            covariance = 0.0
             for size, part, departure in zip(
                 self.variances_m2, self._parts, self.places.departures, strict=True
             ):
                 if departure.kind == kind:
-                    seen = size * self.places.across(departure, volumes) @ weights.T
+                    cross_covariance = size * self.places.across(departure, volumes) @ weights.T
                     variance = size * self.places.within(departure, volumes)
-                    whole = whole + variance - seen - seen.T + weights @ part @ weights.T
-            if np.any(whole):
-                yield Factor(kind, factor_of(whole), type="B", note="assumed")
+                    covariance = (
+                        covariance
+                        + variance
+                        - cross_covariance
+                        - cross_covariance.T
+                        + weights @ part @ weights.T
+                    )
+            if np.any(covariance):
+                yield Factor(kind, factor_of(covariance), type="B", note="assumed")
 
-    def _not_told(self, solid, levels):
+    def _factors_of_prior(self, solid, levels):
         """`Factor` of the part of degree 2 that the straps do not determine."""
         columns = self._by_unknowns(solid, levels) @ self.fit.by_prior
         is_negligible = np.abs(columns).max(axis=0) < ROUNDING * solid.capacity_m3
@@ -194,8 +200,8 @@ def find_strapped_sphere(job, progress):
     size = job.sphere.ovality_m or OVALITY_SHARE * radius
     prior = FormPrior(size, size)
     lengths = FULL_TURN * np.array([reading.radius_m for reading in readings])
-    whole = FULL_TURN**2 * (noise_of(readings) + _parts(places, variances).sum(axis=0))
-    fit = fit_ellipsoid(azimuth[adjusted], lengths, whole, prior)
+    covariance = FULL_TURN**2 * (noise_of(readings) + _parts(places, variances).sum(axis=0))
+    fit = fit_ellipsoid(azimuth[adjusted], lengths, covariance, prior)
     return StrappedSphere(
         reduced=reduced,
         adjusted=adjusted,
@@ -212,8 +218,8 @@ def find_strapped_sphere(job, progress):
 def _normals(azimuth):
     """Unit normals (n, 3) of the planes: vertical for the equator, horizontal for meridians."""
     equator = np.isnan(azimuth)
-    turn = np.where(equator, 0.0, azimuth)
-    level = np.column_stack([np.cos(turn), -np.sin(turn), np.zeros(len(turn))])
+    angle = np.where(equator, 0.0, azimuth)
+    level = np.column_stack([np.cos(angle), -np.sin(angle), np.zeros(len(angle))])
     return np.where(equator[:, None], [0.0, 0.0, 1.0], level)
 
 

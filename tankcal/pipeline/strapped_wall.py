@@ -107,10 +107,10 @@ class TapedWall(ReadWall):
 
     def factors(self, job, weights):
         """`Factor`s of the uncertainty of features, with derivatives (f, n) by the readings."""
-        used, names = self.accepted, names_of(job.courses or job.rings)
-        sees = 1 - np.array([reading.by_inputs.get("plate_thickness", 0.0) for reading in used])
+        accepted, names = self.accepted, names_of(job.courses or job.rings)
+        sees = 1 - np.array([reading.by_inputs.get("plate_thickness", 0.0) for reading in accepted])
         plates = factors_of_plates(names, self.field, weights * sees, self.plate_sd_m)
-        return (*factors_of_readings(used, weights), *plates)
+        return (*factors_of_readings(accepted, weights), *plates)
 
     def read_with(self, weights):
         """Derivatives (f,) of features by inputs on which the readings depend.
@@ -174,9 +174,9 @@ def find_strapped_wall(job, progress, amplitudes=None):
             )
         )
         adjusted_offsets = [i for i, offset in enumerate(lines.offsets) if not offset.check]
-        used = [lines.offsets[i] for i in adjusted_offsets]
+        adjusted = [lines.offsets[i] for i in adjusted_offsets]
         insets = insets_of(job, job.switches)
-        readings += readings_of_offsets(lines, used, courses, insets)
+        readings += readings_of_offsets(lines, adjusted, courses, insets)
         places += adjusted_offsets
     unmeasured = readings_of_untold(job, told_courses(job, set()), joints, zero)
     readings, places = readings + unmeasured, places + [-1] * len(unmeasured)
@@ -229,6 +229,7 @@ def adjust_readings(readings, sizes, amplitudes, *, snooping, bulge_scale=1.0):
     may_go = snooping * np.array([reading.of == "offsets" for reading in readings])
 
     def field_of(accepted):
+        """Field of the accepted readings."""
         rows = np.flatnonzero(accepted)
         rows_kept, noise_of_rows = [readings[i] for i in rows], noise[np.ix_(rows, rows)]
         return field_of_readings(

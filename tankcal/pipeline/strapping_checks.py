@@ -86,18 +86,18 @@ def strapped_together(wall):
     adjusted = straps.adjusted[straps.accepted]
     for indices, place in enumerate(adjusted, len(wall.field.radius_m) - len(wall.readings)):
         names.setdefault(straps.reduced[place].strap.name, []).append((indices, place))
-    repeated = [each for each in names.values() if len(each) > 1]
+    repeated = [repeats for repeats in names.values() if len(repeats) > 1]
     if not repeated:
         return {}
     count = len(wall.field.radius_m)
     precision, pull = tested(wall.field, wall.field.covariance_m2, count)
     discrepant = {}
-    for each in repeated:
-        indices = [one for one, _ in each]
+    for repeats in repeated:
+        indices = [index for index, _ in repeats]
         weight = precision[np.ix_(indices, indices)].sum()
         if weight > 1 / FARTHEST_M**2:  # otherwise uncontrolled
             departure = pull[indices].sum() / weight
-            discrepant[each[0][1]] = float(departure * np.sqrt(weight)), float(departure)
+            discrepant[repeats[0][1]] = float(departure * np.sqrt(weight)), float(departure)
     return discrepant
 
 
@@ -130,8 +130,8 @@ def _check_contradictions(straps, together):
             "circumference {name!r} of course {course!r} is {miss_mm:+.1f} mm from what the points"
             " and all other straps show (w = {w:.1f}): which of them is wrong?"
         )
-        far = abs(miss) > 1000 * FAR_LIMITS * limit_of_repeats(strap.circumference_m)
-        if accepted and far:
+        is_far = abs(miss) > 1000 * FAR_LIMITS * limit_of_repeats(strap.circumference_m)
+        if accepted and is_far:
             text = message(
                 "strap_contradicts_far", template, name=name, course=course, miss_mm=miss, w=size
             )
@@ -181,22 +181,29 @@ def check_repeats(straps, table="repeats"):
 
 def _check_pairs(job, straps):
     """Problems of straps that differ from the other straps of their course by more than taper."""
-    for size, one, count, usual in straps_apart([course.name for course in job.courses], straps):
+    for size, reduced_strap, count, typical in straps_apart(
+        [course.name for course in job.courses], straps
+    ):
         template = (
             "the {count} straps of course {course!r} differ by {apart_mm:.1f} mm, those of"
             " other courses by {usual_mm:.1f} mm: is one of them misread, over an obstruction"
             " or not level?"
         )
-        course, apart, least = one.strap.course, 1000 * size, 1000 * usual
-        if size > FAR_LIMITS * limit_of_repeats(one.circumference_m):
+        course, apart_mm, least = reduced_strap.strap.course, 1000 * size, 1000 * typical
+        if size > FAR_LIMITS * limit_of_repeats(reduced_strap.circumference_m):
             text = message(
-                "strap_far", template, count=count, course=course, apart_mm=apart, usual_mm=least
+                "strap_far", template, count=count, course=course, apart_mm=apart_mm, usual_mm=least
             )
         else:
             text = message(
-                "strap_apart", template, count=count, course=course, apart_mm=apart, usual_mm=least
+                "strap_apart",
+                template,
+                count=count,
+                course=course,
+                apart_mm=apart_mm,
+                usual_mm=least,
             )
-        yield _problem(text, one.strap)
+        yield _problem(text, reduced_strap.strap)
 
 
 def straps_apart(names, straps):
@@ -217,10 +224,14 @@ def straps_apart(names, straps):
     adjusted = [straps.reduced[i] for i in straps.adjusted]
     ranges = []
     for name in names:
-        straps_of_course = [one for one in adjusted if one.strap.course == name]
-        levels = {one.strap.level_m for one in straps_of_course}
+        straps_of_course = [
+            reduced_strap for reduced_strap in adjusted if reduced_strap.strap.course == name
+        ]
+        levels = {reduced_strap.strap.level_m for reduced_strap in straps_of_course}
         if len(levels) > 1:
-            lengths_m = np.array([one.circumference_m for one in straps_of_course])
+            lengths_m = np.array(
+                [reduced_strap.circumference_m for reduced_strap in straps_of_course]
+            )
             deviations = lengths_m - np.median(lengths_m)
             ranges.append(
                 (
@@ -232,9 +243,9 @@ def straps_apart(names, straps):
     if len(ranges) < 3:
         return
     typical = SCALE_OF_MEDIAN * float(np.median([size for size, _, _ in ranges]))
-    for size, one, count in ranges:
-        if size > max(APART_SDS * typical, 2 * limit_of_repeats(one.circumference_m)):
-            yield size, one, count, typical
+    for size, reduced_strap, count in ranges:
+        if size > max(APART_SDS * typical, 2 * limit_of_repeats(reduced_strap.circumference_m)):
+            yield size, reduced_strap, count, typical
 
 
 def _check_courses(job, straps):
@@ -288,15 +299,15 @@ def _check_courses(job, straps):
             text = message("strapped_course_apart", template, name=name, miss_mm=1000 * deviation)
         yield _problem(text, column="course")
     if exchanged is not None:
-        one, other, left, steps = exchanged
+        lower, upper, sum_m, steps = exchanged
         text = message(
             "courses_exchanged",
             "with the readings of courses {one!r} and {other!r} exchanged the steps between"
             " courses would add up to {left_mm:.1f} mm in place of {steps_mm:.1f} mm: are"
             " they mixed up?",
-            one=names[one],
-            other=names[other],
-            left_mm=1000 * left,
+            one=names[lower],
+            other=names[upper],
+            left_mm=1000 * sum_m,
             steps_mm=1000 * steps,
         )
         yield _problem(text, column="course")
@@ -391,6 +402,6 @@ def _check_uncontrolled(job, wall):
 
 def read_once(names, wall):
     """Names of the courses or rings with a single accepted reading."""
-    read = [reading.course for reading in wall.accepted if reading.of != FORMER]
-    counts = np.bincount(read, minlength=len(names))
+    courses = [reading.course for reading in wall.accepted if reading.of != FORMER]
+    counts = np.bincount(courses, minlength=len(names))
     return [name for name, count in zip(names, counts, strict=True) if count == 1]

@@ -86,7 +86,7 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
         As `chain.run`.
     """
     adjustment = sighting = touching = clouded = None
-    is_sighted = any(one is not None for one in (job.hits, job.tangents, job.clouds))
+    is_sighted = any(table is not None for table in (job.hits, job.tangents, job.clouds))
     if job.measurements is not None:
         adjustment = _adjusted(job, progress)
     if not is_sighted and adjustment is not None:
@@ -121,7 +121,7 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
     except SolutionError as error:
         if adjustment is None or not adjustment.warnings:
             raise
-        texts = (one.text for one in placed(job, adjustment.warnings[:TOLD]))
+        texts = (warning.text for warning in placed(job, adjustment.warnings[:TOLD]))
         raise SolutionError(*error.args, *texts) from error
     if adjustment is not None and not is_sighted and is_surveyed_as(survey, "wall"):
         refuse_other_side(job, partial(is_within_wall, survey), adjustment)

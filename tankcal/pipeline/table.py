@@ -108,7 +108,7 @@ def compute_table(job, survey, progress=lambda text: None, body=None):
     exact = _exact(body, zero)
     heights = _rows(spec, exact, top, breakpoints)
     levels = heights + zero
-    volumes, areas, sources = _without_rounding(*body.rows(levels))
+    volumes, areas, sources = _remove_rounding(*body.rows(levels))
     table = Capacity(
         height_m=heights,
         volume_m3=volumes,
@@ -180,6 +180,7 @@ def _undeclared(job, survey, body):
 
 
 def _check_sights(job, survey, sighting):
+    """Warnings about the sights or clouds of a wall."""
     if sighting is None:
         return ()
     if job.hits is not None:
@@ -196,6 +197,7 @@ def _check_sights(job, survey, sighting):
 
 
 def _check_survey(job, survey, top_m):
+    """Warnings about a survey, by its kind."""
     kind = None if survey is None else survey.surveyed_as
     if kind == "wall":
         return _check_wall_of_points(job, survey)
@@ -217,6 +219,7 @@ def _check_survey(job, survey, top_m):
 
 
 def _check_wall_of_points(job, wall):
+    """Warnings about a wall surveyed by points, with its straps and reference lines."""
     from tankcal.pipeline.wall import warnings_of
 
     straps_problems = lean_problems = ()
@@ -238,6 +241,7 @@ def _check_wall_of_points(job, wall):
 
 
 def _check_reference_lines(job, wall):
+    """Warnings about reference lines."""
     if job.lines is None:
         return ()
     from tankcal.pipeline.line_checks import check_lines
@@ -245,7 +249,7 @@ def _check_reference_lines(job, wall):
     return check_lines(job, wall)
 
 
-def _without_rounding(volumes, areas, sources):
+def _remove_rounding(volumes, areas, sources):
     """Rows with exact zeros in place of rounding errors.
 
     Below a raised bottom the volume is a difference of volumes, such as -9e-16 m3 with u of 3e-20

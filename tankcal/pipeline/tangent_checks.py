@@ -76,23 +76,23 @@ def judge_tangents(job, wall, touching):
         return TangentTests(used, departure, w, redundancy, mdb, {})
     sight = adjusted[wall.accepted[order]]  # sight of each reading of the field
     field = wall.field
-    whole = field.covariance_m2 + noise_of_wall(wall) - field.noise_m2
-    precision, pull = tested(field, whole, sites)
+    covariance = field.covariance_m2 + noise_of_wall(wall) - field.noise_m2
+    precision, pull = tested(field, covariance, sites)
     weight = np.maximum(np.diag(precision), 1e-300)
     departure[sight], w[sight] = pull / weight, pull / np.sqrt(weight)
     variance_m2 = (job.tangents.sd_rad * touching.length_m) ** 2 + touching.hull.own_sd_m**2
     redundancy[sight] = np.clip(variance_m2[sight] * weight, 0, 1)
     mdb[sight] = noncentrality() / np.sqrt(weight)
     setups = moved_setups(
-        field, whole, np.array(job.tangents.setup)[sight], _columns(touching, sight), SUSPECT
+        field, covariance, np.array(job.tangents.setup)[sight], _columns(touching, sight), SUSPECT
     )
     return TangentTests(used, departure, w, redundancy, mdb, setups)
 
 
-def _columns(touching, at):
+def _columns(touching, sights):
     """Derivatives (k, 3) of tangents by the rotation of the circle and shift of the station."""
-    azimuth = touching.normal_rad[at]
-    length = np.where(touching.seen_right[at], 1.0, -1.0) * touching.length_m[at]
+    azimuth = touching.normal_rad[sights]
+    length = np.where(touching.seen_right[sights], 1.0, -1.0) * touching.length_m[sights]
     return np.column_stack([length, np.sin(azimuth), np.cos(azimuth)])
 
 
@@ -229,7 +229,7 @@ def _check_heights(job, touching):
         )
         yield Problem(tangents.file, text, None, "level_m")
         return
-    for (course, level, other), places in places_by_key.items():
+    for (course, level, other_course), places in places_by_key.items():
         text = message(
             "tangents_at_other_level",
             "tangents of {level:g} m on course {course!r} ({count}) touch the wall {off:+.2f} m"
@@ -239,7 +239,7 @@ def _check_heights(job, touching):
             level=level,
             course=course,
             off=float(np.median(off_m[places])),
-            other=other,
+            other=other_course,
         )
         yield Problem(tangents.file, text, _row(tangents, places[0]), "level_m")
 

@@ -150,7 +150,7 @@ def _hull_of(job, touching, wall):
         course = int(course_of(height, joints))
         low, high = joints[course : course + 2]
         outline = field.outlines_at([2 * (height - low) / (high - low) - 1])[course, 0]
-        outline = _without_shift(outline)
+        outline = _remove_shift(outline)
         support = support_of(outline)
         step = FULL_TURN / len(outline)
         index = np.rint(touching.normal_rad[is_of_level] / step).astype(int) % len(outline)
@@ -160,7 +160,7 @@ def _hull_of(job, touching, wall):
     return Hull(excess_m + unseen_excess[:, 0], unseen_excess[:, 1], unseen_excess[:, 2], slope_m)
 
 
-def _without_shift(radii_m):
+def _remove_shift(radii_m):
     """Radii at equally spaced azimuths without their first harmonic, about their own centre."""
     waves = np.fft.rfft(radii_m)
     waves[1] = 0.0
@@ -176,15 +176,16 @@ def _departure_of_limbs(field):
     )
 
 
-def _not_settled(before, after):
+def _not_settled(former, latter):
+    """Message that wall and excess do not settle."""
     return message(
         "excess_not_settled",
         "no capacity: the convex hull that the tangents touch stands {before_mm:.1f} mm outside the"
         " wall in one pass and {after_mm:.1f} mm in the next, so the tangents do not determine the"
         " form of this wall; sight more limbs (stations at other distances), strap a course"
         " (circumferences.csv), or measure points of the wall",
-        before_mm=1000 * float(before.excess_m.max()),
-        after_mm=1000 * float(after.excess_m.max()),
+        before_mm=1000 * float(former.excess_m.max()),
+        after_mm=1000 * float(latter.excess_m.max()),
     )
 
 

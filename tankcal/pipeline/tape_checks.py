@@ -83,14 +83,14 @@ def _check_shell_temperature(job, straps):
 
 def _check_pulls(straps):
     """Problems of pulls unlike that of the certificate, once for each tape and pull."""
-    certified, seen = {tape.name: tape.tension_n for tape, _ in straps.tapes}, set()
+    certified, reported = {tape.name: tape.tension_n for tape, _ in straps.tapes}, set()
     for reduced_strap in straps.reduced:
         pull, of_tape = reduced_strap.strap.tension_n, certified.get(reduced_strap.strap.tape)
         if not (pull and of_tape) or 1 / PULL <= pull / of_tape <= PULL:
             continue
-        if (reduced_strap.strap.tape, pull) in seen:
+        if (reduced_strap.strap.tape, pull) in reported:
             continue
-        seen.add((reduced_strap.strap.tape, pull))
+        reported.add((reduced_strap.strap.tape, pull))
         text = message(
             "pull_unlike_certificate",
             "{pull_n:g} N, and {certified_n:g} N in the certificate of {tape!r}: is one of them in"
@@ -106,8 +106,8 @@ def _check_pulls(straps):
 def _units_near(first_n, second_n):
     """Names of the units in which the smaller of two forces resembles the larger."""
     low, high = sorted((first_n, second_n))
-    near = [name for name, size in UNITS_N.items() if 1 / PULL <= size * low / high <= PULL]
-    return " / ".join(near or UNITS_N)
+    units = [name for name, size in UNITS_N.items() if 1 / PULL <= size * low / high <= PULL]
+    return " / ".join(units or UNITS_N)
 
 
 def _check_certificates(straps):
@@ -169,14 +169,14 @@ def _check_whole_correction(tape, straps):
     length = float(np.median(readings_m))
     limit = limits_of("strapping")["class_ii"]
     most = (limit["mm"] + limit["mm_per_m"] * length) / 1000
-    whole = tape.correction_m + tape.correction * length
-    if tape.correction_m and abs(whole) > most:
+    correction_m = tape.correction_m + tape.correction * length
+    if tape.correction_m and abs(correction_m) > most:
         text = message(
             "tape_correction_mm_strange",
             "with correction {found_mm:+.1f} mm of the {length_m:.1f} m that were read; a tape that"
             " passed a verification is off by no more than {most_mm:.1f} mm: is it in another"
             " unit, or that of another tape?",
-            found_mm=1000 * whole,
+            found_mm=1000 * correction_m,
             length_m=length,
             most_mm=1000 * most,
         )
@@ -185,10 +185,10 @@ def _check_whole_correction(tape, straps):
 
 def _check_comparisons(job, straps):
     """Problem of comparisons with a master that differ beyond their standard deviations."""
-    used = [tape for tape, _ in straps.tapes if tape.master]
+    compared_tapes = [tape for tape, _ in straps.tapes if tape.master]
     strapping = job.strapping if job.great_circles is None else job.great_circles.strapping
     comparisons = [comparison for comparison in strapping.comparisons if comparison.sd_m > 0]
-    if not used or len(comparisons) < 2:
+    if not compared_tapes or len(comparisons) < 2:
         return
     differences = np.array(
         [comparison.master_m - comparison.working_m for comparison in comparisons]
@@ -209,7 +209,7 @@ def _check_comparisons(job, straps):
             "{name!r} against its master: the comparisons {one!r} and {other!r} differ by"
             " {apart_mm:.1f} mm, with standard deviations of {sd_mm:g} mm: was one misread, or the"
             " tape overstretched between?",
-            name=used[0].name,
+            name=compared_tapes[0].name,
             one=" ".join(filter(None, (worst.level, worst.when))),
             other=" ".join(filter(None, (least.level, least.when))),
             apart_mm=float(np.ptp(residuals_mm)),
@@ -311,6 +311,7 @@ def _digit_m(straps):
 
 
 def _copied(first, second):
+    """Problem of a reading that repeats another reading."""
     text = message(
         "reading_copied",
         "{reading_m:g} m again, as in row {row}, to the last digit: was it copied?",

@@ -161,6 +161,6 @@ def with_spread(told, section, fitted):
     -------
     Section
     """
-    by = circle_by_coordinates(section, *fitted[1:])
-    cofactor = section.circle.cofactor_m2 + told.spread_of(by, section.group.members)
+    derivative = circle_by_coordinates(section, *fitted[1:])
+    cofactor = section.circle.cofactor_m2 + told.spread_of(derivative, section.group.members)
     return replace(section, circle=replace(section.circle, cofactor_m2=cofactor))

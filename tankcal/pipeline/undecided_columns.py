@@ -49,9 +49,9 @@ def factors_of_undecided(halves):
 
     Notes
     -----
-    Column i belongs to the wall with an unknown probability p. For p uniform from 0 to 1 its variance
-    is 1/4. The covariance of two columns is the variance of p, 1/12. Therefore many seams or many
-    pipes of a tank do not average out.
+    Column i belongs to the wall with an unknown probability p. For p uniform from 0 to 1 its
+    variance is 1/4. The covariance of two columns is the variance of p, 1/12. Therefore many seams
+    or many pipes of a tank do not average out.
 
     Examples
     --------

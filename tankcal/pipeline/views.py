@@ -83,6 +83,7 @@ def _residuals(plots, result):
 
 
 def _wall(plots, result):
+    """Residuals on the unrolled wall."""
     wall, rings = result.wall, _rings(plots, result)
     members = np.concatenate([section.group.members for section in wall.sections])
     height_m = result.job.points.xyz_m[wall.accepted[members], 2] - result.job.datum.bottom_z_m
@@ -92,6 +93,7 @@ def _wall(plots, result):
 
 
 def _field(plots, result):
+    """Wall of the table, unrolled."""
     wall, field = result.wall, result.wall.field
     zeta, joints = np.linspace(-1, 1, LEVELS_OF_A_COURSE), wall.joints_m
     outlines = field.outlines_at(zeta)
@@ -113,6 +115,7 @@ def _field(plots, result):
 
 
 def _rings(plots, result):
+    """`Ring`s of the sections of a result."""
     every_degree = np.arange(360.0)
     return [
         plots.Ring(

@@ -139,9 +139,11 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     is_known = amplitudes is not None
     amplitudes = amplitudes if is_known else sizes
     if amplitudes is None:
-        alone = sites.take(np.ones(len(sites), dtype=bool))  # without courses that lack points
+        measured_sites = sites.take(
+            np.ones(len(sites), dtype=bool)
+        )  # without courses that lack points
         amplitudes = estimate_amplitudes(
-            alone,
+            measured_sites,
             radius,
             noise,
             nominal,
@@ -159,7 +161,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     form_m2 = _form_m2(amplitudes)
     sections = tuple(fit_section(*section, form_m2) for section in to_fit)
     by_points = means @ _radii_by_points(sections, len(accepted))
-    by_inputs = _by_inputs(job.points, by_points, accepted)
+    by_inputs = _derivatives_by_inputs(job.points, by_points, accepted)
     is_read = job.strapping is not None or job.lines is not None
     is_read = is_read or (
         job.radii is not None and len({group.course for group in groups}) < len(job.courses)
@@ -228,7 +230,7 @@ def _sizes_of(shell):
     return np.append(shell.sizes_m2[:-1], shell.sizes_m2[-1] / shell.noise_m**2)
 
 
-def _by_inputs(points, by_points, accepted):
+def _derivatives_by_inputs(points, by_points, accepted):
     """{input of the budget: derivative (n,) of the radii}, for inputs that affect the points."""
     index = coordinates_of(accepted)
     return {name: by_points @ column[index] for name, column in points.by_inputs.items()}
@@ -312,8 +314,8 @@ def _blocks(samples):
 
 def _form_m2(amplitudes):
     """Variance factor of a k^-3 spectrum with the form of the wall, to smooth outlines, m2."""
-    chosen = [component.shape in ROUND_SHAPES for component in COMPONENTS]
-    return float(np.sum(amplitudes.likely_m2[chosen])) / np.sum(OVALITY_MODES**-3)
+    is_round = [component.shape in ROUND_SHAPES for component in COMPONENTS]
+    return float(np.sum(amplitudes.likely_m2[is_round])) / np.sum(OVALITY_MODES**-3)
 
 
 def _radii_by_points(sections, count):

@@ -117,9 +117,9 @@ def wall_shape_of(job, wall):
     rows += [base.plumb(*pair) for pair in (*pairs, *of_courses)]
     if pairs:
         rows.append(base.axis(*pairs[-1]))
-    whole = base.figures(np.vstack(rows))
+    all_figures = base.figures(np.vstack(rows))
     ends = np.cumsum([0, *map(len, rows)])
-    figures = [whole.part(*pair) for pair in pairwise(ends)]
+    figures = [all_figures.part(*pair) for pair in pairwise(ends)]
     radii, differences = figures[: len(levels)], figures[len(levels) :]
     plumbs = [
         Plumb(low, high, levels[low].azimuth_rad, base.is_read(low, high), part)

@@ -166,7 +166,7 @@ class Straps:
 
 
 def gauged_plates(job):
-    """{index of a course or ring: standard uncertainty of its gauged plate, m} of a strapped job."""
+    """{index of a course or ring: standard uncertainty of its gauged plate, m} of a job."""
     plate_sd_m, parts = job.strapping.plate_sd_m, job.courses or job.rings
     return {i: plate_sd_m[part.name] for i, part in enumerate(parts) if part.name in plate_sd_m}
 
@@ -263,10 +263,12 @@ def join_readings(job, points, amplitudes, joints_m, *, is_known):
     if not is_known and len(np.unique(points.sites.course)) < len(names):
         amplitudes = None
     field, tested, readings = _joined_field(job, points, readings, amplitudes, (joints_m, zero))
-    read = ReadWall(
+    read_wall = ReadWall(
         joints_m, zero, tuple(readings), np.array(places, dtype=int), tested, field, inner_m=inner
     )
-    return read, None if tape_results is None else _straps_of(job, read, tape_results, inner)
+    return read_wall, None if tape_results is None else _straps_of(
+        job, read_wall, tape_results, inner
+    )
 
 
 def _offsets_of(lines, names, insets, sites):
@@ -302,12 +304,13 @@ def _joined_field(job, points, readings, amplitudes, heights):
     """
     n, k, nominal = len(points.radius_m), len(readings), job.tank.nominal_diameter_m / 2
     sites = sites_of(readings, *heights)
-    both = points.unbound.padded(k).shared_by(_joined(points.sites, sites))
-    is_bound = both.shared is None
+    all_sites = points.unbound.padded(k).shared_by(_joined(points.sites, sites))
+    is_bound = all_sites.shared is None
     if sites.shared is not None:  # unknowns of lines are last, as `ReadWall` expects
         line_columns = np.pad(sites.shared, ((n, 0), (0, 0)))
-        both = replace(
-            both, shared=line_columns if is_bound else np.hstack([both.shared, line_columns])
+        all_sites = replace(
+            all_sites,
+            shared=line_columns if is_bound else np.hstack([all_sites.shared, line_columns]),
         )
     columns = columns_of([reading.by_inputs for reading in readings])
     columns = {
@@ -328,14 +331,15 @@ def _joined_field(job, points, readings, amplitudes, heights):
         apart = int(points.sites.ring.max(initial=-1)) + 1
 
     def field_of(accepted):
+        """Field of the points and the accepted readings."""
         rows = np.flatnonzero(accepted)
         noise_of_rows, amplitudes_used = noise[np.ix_(rows, rows)], amplitudes
         if amplitudes_used is None:
             amplitudes_used = estimate_amplitudes(
-                both.take(accepted), radius[rows], noise_of_rows, nominal
+                all_sites.take(accepted), radius[rows], noise_of_rows, nominal
             )
         return WallField(
-            both.take(accepted),
+            all_sites.take(accepted),
             radius[rows],
             noise_of_rows,
             amplitudes_used,
@@ -343,16 +347,16 @@ def _joined_field(job, points, readings, amplitudes, heights):
             plumbed=apart,
         )
 
-    radius, every = (
+    radius, accepted_at_first = (
         np.append(points.radius_m, [reading.radius_m for reading in readings]),
         np.ones(n + k),
     )
-    field = field_of(every > 0)
+    field = field_of(accepted_at_first > 0)
     if np.any(sites.ring >= 0):
         readings = off_centre(readings, field)
         radius = np.append(points.radius_m, [reading.radius_m for reading in readings])
-        field = field_of(every > 0)
-    field, tested = settle_readings(field, field_of, (both, radius, noise), may_go)
+        field = field_of(accepted_at_first > 0)
+    field, tested = settle_readings(field, field_of, (all_sites, radius, noise), may_go)
     parts = (tested.accepted, tested.departure_m, tested.w, tested.sd_m)
     return field, Tested(*(part[n:] for part in parts)), readings
 

@@ -22,16 +22,16 @@ def weak_sections(job, groups, azimuth_rad):
 
     Sections are named individually, or together if there are more than `TOLD_ALONE` of a kind.
     """
-    few, gaps = [], []
+    sparse, gaps = [], []
     for group in groups:
         ordered = np.sort(azimuth_rad[group.members])
         gap = np.degrees(np.max(np.diff(ordered, append=ordered[0] + 2 * np.pi)))
         named = {"section": _shown(job, group), "course": job.courses[group.course].name}
         if len(ordered) < ADVISED_POINTS:
-            few.append((len(ordered), named))
+            sparse.append((len(ordered), named))
         if gap > WIDE_GAP_DEG:
             gaps.append((gap, named))
-    kinds = (few, _with_few, _all_with_few), (gaps, _with_gap, _all_with_gaps)
+    kinds = (sparse, _with_few, _all_with_few), (gaps, _with_gap, _all_with_gaps)
     texts = []
     for sections, text_of_section, text_of_sections in kinds:
         texts += (
@@ -43,6 +43,7 @@ def weak_sections(job, groups, azimuth_rad):
 
 
 def _with_few(count, named):
+    """Message about a section with few points."""
     return message(
         "section_weak",
         "section {section} (course {course}) has only {count} points; {advised} or more are "
@@ -54,6 +55,7 @@ def _with_few(count, named):
 
 
 def _all_with_few(sections):
+    """Message about all sections with few points."""
     return message(
         "sections_weak",
         "{all} sections have fewer than {advised} points, {count} at least: {sections}; {advised} "
@@ -66,6 +68,7 @@ def _all_with_few(sections):
 
 
 def _with_gap(gap_deg, named):
+    """Message about a section with a gap."""
     return message(
         "section_gap",
         "section {section} (course {course}) has no point over {gap_deg:.0f} deg of its "
@@ -76,6 +79,7 @@ def _with_gap(gap_deg, named):
 
 
 def _all_with_gaps(sections):
+    """Message about all sections with a gap."""
     return message(
         "sections_gap",
         "{all} sections have no point over a part of their circumference, {gap_deg:.0f} deg at "
@@ -155,7 +159,7 @@ def check_shell(job, shell, sections, given_sd_m):
     -------
     list of Problem
     """
-    texts = _of_scatter(shell, None if job.points.from_adjustment else given_sd_m)
+    texts = _texts_of_scatter(shell, None if job.points.from_adjustment else given_sd_m)
     if not shell.tilt_known:
         texts.append(
             message(
@@ -192,7 +196,7 @@ def check_shell(job, shell, sections, given_sd_m):
     return of_points(job.points, texts)
 
 
-def _of_scatter(shell, given_sd_m):
+def _texts_of_scatter(shell, given_sd_m):
     """Warning of a large scatter about the form, against stated standard deviations if given."""
     noise_mm = 1000 * shell.noise_m
     if given_sd_m is not None:

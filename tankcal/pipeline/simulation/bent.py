@@ -72,11 +72,26 @@ class DatumLaw:
 
 
 def datum_law(body, levels_m, u_m, distribution):
-    """`DatumLaw` of rows for a datum of standard uncertainty u_m, with its distribution in units of u."""
+    """`DatumLaw` of rows.
+
+    Parameters
+    ----------
+    body : Body
+    levels_m : ndarray, shape (rows,)
+        Levels of the rows, m.
+    u_m : float
+        Standard uncertainty of the datum, m.
+    distribution
+        Distribution of the datum, in units of u_m.
+
+    Returns
+    -------
+    DatumLaw
+    """
     below = ndtr(SCORES)
     steps = u_m * distribution.quantile(below)
-    every = np.repeat(levels_m, len(steps)), np.tile(steps, len(levels_m))
-    moved = body.moved_m3(*every).reshape(len(levels_m), len(steps))
+    grid = np.repeat(levels_m, len(steps)), np.tile(steps, len(levels_m))
+    moved = body.moved_m3(*grid).reshape(len(levels_m), len(steps))
     return DatumLaw(below, moved - body.volume_m3(levels_m)[:, None])
 
 
@@ -145,9 +160,9 @@ class _Law:
         low, high = np.minimum(first, last), np.maximum(first, last)
         is_constant = high - low <= 1e-12 * max(np.abs(added).max(), 1e-300)
         density = mass[~is_constant] / (high - low)[~is_constant]
-        nothing = np.zeros(np.count_nonzero(is_constant))
+        zeros = np.zeros(np.count_nonzero(is_constant))
         place = np.concatenate([low[~is_constant], high[~is_constant], low[is_constant]])
-        steeper = np.concatenate([density, -density, nothing])
+        steeper = np.concatenate([density, -density, zeros])
         jumps = np.concatenate([0 * density, 0 * density, mass[is_constant]])
         order = np.argsort(place, kind="stable")
         self.place = place[order]

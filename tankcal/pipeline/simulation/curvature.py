@@ -48,7 +48,7 @@ def vary_input(job, name, change):
     """Job with `change` (SI) added to the input `name` of VARIED; None without such an input."""
     if name in _OF_VALUES:
         part, key = _OF_VALUES[name]
-        return _with(job, part, key, change)
+        return _vary_value(job, part, key, change)
     if name in ("plate_thickness", "paint") and job.courses:
         key = {"plate_thickness": "thickness_m", "paint": "paint_m"}[name]
         courses = (
@@ -59,12 +59,12 @@ def vary_input(job, name, change):
         key = {"plate_thickness": "thickness_m", "paint": "paint_m"}[name]
         rings = tuple(replace(ring, **{key: getattr(ring, key) + change}) for ring in job.rings)
         moved = replace(job, rings=rings)
-        return moved if name == "paint" else _of_solid(moved, name, change)
+        return moved if name == "paint" else _vary_solid(moved, name, change)
     if job.tank.kind == "vertical":
-        return _of_heads(job, name, change)
+        return _vary_head(job, name, change)
     if job.points is not None:
-        return None if name != "plate_thickness" else _of_solid(job, name, change)
-    return _of_solid(job, name, change)
+        return None if name != "plate_thickness" else _vary_solid(job, name, change)
+    return _vary_solid(job, name, change)
 
 
 _OF_VALUES = {
@@ -79,14 +79,14 @@ _OF_VALUES = {
 }
 
 
-def _of_heads(job, name, change):
-    """Job with a changed size of its bottom, of its top head, or of both; None without such a size."""
+def _vary_head(job, name, change):
+    """Job with a changed size of its bottom, of its top head, or of both, or None."""
     bottom, top = job.bottom, job.top
     if name == "bottom_depth" and bottom.centre_z_m is not None:
-        down = bottom.centre_z_m < job.datum.bottom_z_m
-        return _with(job, "bottom", "centre_z_m", -change if down else change)
+        is_below = bottom.centre_z_m < job.datum.bottom_z_m
+        return _vary_value(job, "bottom", "centre_z_m", -change if is_below else change)
     if name == "top_depth" and top is not None and top.depth_m:
-        return _with(job, "top", "depth_m", change)
+        return _vary_value(job, "top", "depth_m", change)
     if name not in RADII:
         return None
     key = _OF_ENDS[name]
@@ -101,10 +101,11 @@ def _of_heads(job, name, change):
 _ABSENT = ("tube_angle_rad", "tube_offset_m")  # 0 if not given
 
 
-def _of_solid(job, name, change):
+def _vary_solid(job, name, change):
+    """Job with a changed size of its horizontal cylinder or sphere; None without such a size."""
     if job.sphere is not None:
         key = {"diameter": "diameter_m", "plate_thickness": "thickness_m"}.get(name)
-        return None if key is None else _with(job, "sphere", key, change)
+        return None if key is None else _vary_value(job, "sphere", key, change)
     if job.horizontal is None:
         return None
     lying = job.horizontal
@@ -112,7 +113,7 @@ def _of_solid(job, name, change):
         wider = replace(lying, width_m=lying.width_m + change, height_m=lying.height_m + change)
         return replace(job, horizontal=wider)
     if name in _OF_ENDS:
-        ends = {key: _varied(getattr(lying, key), name, change) for key in ("end_a", "end_b")}
+        ends = {key: _vary_end(getattr(lying, key), name, change) for key in ("end_a", "end_b")}
         return None if None in ends.values() else replace(job, horizontal=replace(lying, **ends))
     keys = {
         "tube_angle": "tube_angle_rad",
@@ -122,7 +123,7 @@ def _of_solid(job, name, change):
         "tilt": "tilt",
         "dip_position": "dip_from_a_m",
     }
-    return _with(job, "horizontal", keys[name], change) if name in keys else None
+    return _vary_value(job, "horizontal", keys[name], change) if name in keys else None
 
 
 _OF_ENDS = {
@@ -132,7 +133,7 @@ _OF_ENDS = {
 }
 
 
-def _varied(end, name, change):
+def _vary_end(end, name, change):
     """End with a changed size; None for the depth of a torispherical end that radii define."""
     key = _OF_ENDS[name]
     size = getattr(end, key)
@@ -141,11 +142,14 @@ def _varied(end, name, change):
     return None if end.kind == "torispherical" and name == "end_depth" else end
 
 
-def _with(job, part, key, change):
-    whole = getattr(job, part)
-    if getattr(whole, key) is None and key not in _ABSENT:
+def _vary_value(job, part, key, change):
+    """Job with `change` added to one value of a part; None if the value is not given."""
+    part_of_job = getattr(job, part)
+    if getattr(part_of_job, key) is None and key not in _ABSENT:
         return None
-    return replace(job, **{part: replace(whole, **{key: (getattr(whole, key) or 0.0) + change})})
+    return replace(
+        job, **{part: replace(part_of_job, **{key: (getattr(part_of_job, key) or 0.0) + change})}
+    )
 
 
 # Number of rows at which curvatures are computed, and of these next to the empty tank.
@@ -196,7 +200,7 @@ def curvature(job, survey, body, levels_m, declared, least_m3):
     chosen_rows = _picked(len(levels_m))
     columns_by_pair = {}
     for name in declared:
-        columns = _of_input(job, survey, body, levels_m, chosen_rows, name, declared)
+        columns = _by_input(job, survey, body, levels_m, chosen_rows, name, declared)
         for other, column in columns.items():
             columns_by_pair.setdefault(tuple(sorted((name, other))), []).append(column)
     u_of_rows = np.where(least_m3 > 0, least_m3, np.inf)
@@ -209,12 +213,12 @@ def curvature(job, survey, body, levels_m, declared, least_m3):
     return Curvature(tuple(kept_pairs), empty if values is None else values)
 
 
-def _of_input(job, survey, body, levels_m, picked, name, declared):
+def _by_input(job, survey, body, levels_m, picked, name, declared):
     """{other input: second derivatives (rows,), times both u} by one input."""
     if name == "datum":
-        return _of_level(body, levels_m, declared)
+        return _by_datum(body, levels_m, declared)
     if name == "scale":
-        return _of_scale(body, levels_m, declared) if body.shell is not None else {}
+        return _by_scale(body, levels_m, declared) if body.shell is not None else {}
     if name == "tilt" and body.shell is not None:
         in_shell = np.minimum(levels_m, body.shell.volume.height_m)
         return {"tilt": body.shell.volume_m3(in_shell) * declared["tilt"] ** 2}
@@ -247,17 +251,20 @@ def _slopes_of_moved(job, survey, levels_m, name, step):
     return [tank.derivatives(np.minimum(levels_m, tank.highest_m)) for tank in tanks]
 
 
-def _of_level(body, levels_m, declared):
+def _by_datum(body, levels_m, declared):
     """Second derivatives by the datum and each other input.
 
     Parts that move with the dips, such as deadwood, have none by the datum.
     """
     u = declared["datum"]
-    up = np.minimum(levels_m + u, body.highest_m)
-    down = np.maximum(levels_m - u, body.lowest_m)
+    upper_m = np.minimum(levels_m + u, body.highest_m)
+    lower_m = np.maximum(levels_m - u, body.lowest_m)
     moving = [part for part in body.parts if not part.moves_with_zero]
-    ends = [sum_derivatives(part.derivatives(levels) for part in moving) for levels in (up, down)]
-    span = np.where(up > down, (up - down) / u, 1.0)
+    ends = [
+        sum_derivatives(part.derivatives(levels) for part in moving)
+        for levels in (upper_m, lower_m)
+    ]
+    span = np.where(upper_m > lower_m, (upper_m - lower_m) / u, 1.0)
     return {
         other: (ends[0][other] - ends[1][other]) / span * u_other
         for other, u_other in declared.items()
@@ -265,7 +272,8 @@ def _of_level(body, levels_m, declared):
     }
 
 
-def _of_scale(body, levels_m, declared):
+def _by_scale(body, levels_m, declared):
+    """Second derivatives by the scale and each other input."""
     slopes = body.derivatives(levels_m)
     return {
         other: multiplier * slopes[other] * declared[other] * declared["scale"]

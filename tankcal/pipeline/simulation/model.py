@@ -130,7 +130,7 @@ class Model:
         )
         even = even[kept]
         if len(bent):
-            simulation = _merged(simulation, even, self._of_bent(bent, goal), bent)
+            simulation = _merged(simulation, even, self._simulate_bent_rows(bent, goal), bent)
         places = np.sort(np.concatenate([even, bent]))
         u = np.linalg.norm(self.inputs.slopes, axis=1)
         all_volumes = spread_to_all(simulation, places, self.quadratic.value, u, goal.digits)
@@ -146,10 +146,11 @@ class Model:
     def _thinned(self, volumes, most):
         """At most `most` evenly spaced rows among these volumes, and all deliveries."""
         rows = volumes[volumes < self.rows]
-        some = np.linspace(0, len(rows) - 1, min(most, len(rows))).round().astype(int)
-        return np.concatenate([rows[some], volumes[len(rows) :]])
+        chosen_rows = np.linspace(0, len(rows) - 1, min(most, len(rows))).round().astype(int)
+        return np.concatenate([rows[chosen_rows], volumes[len(rows) :]])
 
     def _quadratic(self):
+        """`QuadraticRows` of all volumes, from slopes and second derivatives."""
         count, pairs = len(self.inputs.distributions), self.curved.pairs
         hessians = np.zeros((max(len(pairs), 1), count, count))
         for hessian, (first, second_input) in zip(hessians, pairs, strict=False):
@@ -179,24 +180,24 @@ class Model:
             rows = bent_rows(self.body, self.levels, self.datum_m, slope, second, self.table.u_m3)
         return np.concatenate([rows, (self.weights != 0) @ rows > 0])
 
-    def _of_bent(self, bent, goal):
+    def _simulate_bent_rows(self, bent, goal):
         """`Simulation` of the volumes that are not quadratic, by their significant inputs."""
         datum, slopes = self.inputs.place["datum"], np.abs(self.inputs.slopes[bent])
         is_active = np.any(slopes > UNFELT * np.linalg.norm(slopes, axis=1, keepdims=True), axis=0)
         is_active[datum] = False
-        others = np.flatnonzero(is_active)
+        indices = np.flatnonzero(is_active)
         part = self.quadratic.subset(bent)
         rest = replace(
             part,
-            jacobian=part.jacobian[:, others],
-            hessians=part.hessians[:, others][:, :, others],
-            mean=np.zeros(len(others)),
+            jacobian=part.jacobian[:, indices],
+            hessians=part.hessians[:, indices][:, :, indices],
+            mean=np.zeros(len(indices)),
         )
         weights = self._weights_of(bent)
         needed = np.flatnonzero(np.any(weights != 0, axis=0))
         unit = self.inputs.distributions[datum]
         law = datum_law(self.body, self.levels[needed], self.datum_m, unit)
-        distributions = [self.inputs.distributions[place] for place in others]
+        distributions = [self.inputs.distributions[place] for place in indices]
         return simulate_bent(
             rest, distributions, weights[:, needed] @ law.added_m3, law.below, goal
         )
@@ -213,8 +214,8 @@ class Model:
 def _merged(quadratic, even, bent_simulation, bent):
     """Combine two simulations of different volumes into one."""
     order = np.argsort(np.concatenate([even, bent]))
-    both = zip(quadratic.by_volume.items(), bent_simulation.by_volume.values(), strict=True)
-    return replace(quadratic, **{name: np.concatenate([a, b])[order] for (name, a), b in both})
+    pairs = zip(quadratic.by_volume.items(), bent_simulation.by_volume.values(), strict=True)
+    return replace(quadratic, **{name: np.concatenate([a, b])[order] for (name, a), b in pairs})
 
 
 def spread_to_all(found, places, value_m3, u_m3, digits):

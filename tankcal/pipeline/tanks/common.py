@@ -63,14 +63,14 @@ def estimates_of(job):
         "survey_level": _thousand(survey.liquid_level_m),
         "survey_density": survey.liquid_density_kg_m3,
         "roof_mass": job.roof and job.roof.mass_kg,
-        **_of_solid(job),
-        **_of_ship(job),
-        **_of_heads(job),
+        **_sizes_of_solid(job),
+        **_values_of_ship(job),
+        **_sizes_of_heads(job),
     }
     return {name: value for name, value in values_of_inputs.items() if value is not None}
 
 
-def _of_heads(job):
+def _sizes_of_heads(job):
     """Declared sizes of the bottom of an upright tank and of the head on it."""
     if job.tank.kind != "vertical":
         return {}
@@ -88,7 +88,7 @@ def _of_heads(job):
     }
 
 
-def _of_solid(job):
+def _sizes_of_solid(job):
     """Declared sizes of a horizontal cylinder or a sphere."""
     lying, solid = job.horizontal, job.horizontal or job.sphere
     if solid is None:
@@ -116,7 +116,7 @@ def _of_solid(job):
     }
 
 
-def _of_ship(job):
+def _values_of_ship(job):
     """Even keel, position of the pipe in the ship's frame, and contraction."""
     if job.ship is None:
         return {}
@@ -177,7 +177,7 @@ def thermal_scale(job, switches):
 
 
 def is_warmed(job, switches):
-    """Whether the thermal correction of lengths applies: enabled, with a known shell temperature."""
+    """Whether lengths are corrected for temperature: enabled, with a known shell temperature."""
     return switches.temperature and job.survey.shell_temperature_c is not None
 
 

@@ -49,15 +49,15 @@ def _part(job, survey, switches, heel):
     unused, survey_results = () if plate else ("plate_thickness",), {}
     if job.great_circles is not None:
         solid = survey.solid(plate, scale)
-        survey_results, unused = _of_circles(survey, plate, scale), (*unused, "offset")
+        survey_results, unused = _arguments_of_circles(survey, plate, scale), (*unused, "offset")
     elif job.sphere is not None:
         solid = Sphere((job.sphere.diameter_m - 2 * plate) * scale)
     elif job.horizontal is not None:
         solid = _lying(job.horizontal, plate, scale)
     else:
-        solid = _of_mesh(job, survey, scale, heel)
+        solid = _part_of_mesh(job, survey, scale, heel)
     if job.points is not None:
-        survey_results = _of_scan(survey, scale)
+        survey_results = _arguments_of_scan(survey, scale)
     pressure = pressure_of(job)
     if (
         switches.head and pressure.is_there and job.sphere.thickness_m
@@ -122,6 +122,7 @@ def sized_job(job, scan):
 
 
 def _with_sizes(job, names, values):
+    """Job with the given sizes in place of its declared sizes."""
     sizes = dict(zip(names, map(float, values), strict=True))
     if job.sphere is not None:
         return replace(job, sphere=replace(job.sphere, diameter_m=sizes["diameter"]))
@@ -130,7 +131,7 @@ def _with_sizes(job, names, values):
     return replace(job, horizontal=lying)
 
 
-def _of_scan(scan, scale):
+def _arguments_of_scan(scan, scale):
     """Results of a scan as arguments of `SolidPart`; volumes are scaled."""
     factors = tuple(
         replace(factor, columns=scale**3 * factor.columns) for factor in scan.form.factors
@@ -138,7 +139,7 @@ def _of_scan(scan, scale):
     return {"surveyed": scan.names, "form": replace(scan.form, factors=factors)}
 
 
-def _of_circles(sphere, plate_m, scale):
+def _arguments_of_circles(sphere, plate_m, scale):
     """Results of great circles as arguments of `SolidPart`; volumes are scaled."""
     form, read_with = sphere.part_of_volumes(plate_m)
     factors = tuple(replace(factor, columns=scale**3 * factor.columns) for factor in form.factors)
@@ -169,7 +170,7 @@ def _membrane(job):
     return Membrane(job.sphere.thickness_m, job.material.e_pa, ratio)
 
 
-def _of_mesh(job, mesh, scale, heel):
+def _part_of_mesh(job, mesh, scale, heel):
     """Part enclosed by a mesh.
 
     Levels count from the dip plate or the lowest point; on a ship, along the pipe from its lower
@@ -190,6 +191,7 @@ def ship_pipe(ship):
 
 
 def _on_ship(ship, mesh, scale, heel):
+    """Part enclosed by the mesh of a ship's tank, with levels along its pipe."""
     contracted = None if ship.contraction is None else 1 - ship.contraction
     return piped_mesh(
         replace(mesh, vertices_m=in_ship_frame(mesh.vertices_m, ship.bow_azimuth_rad)),
@@ -202,6 +204,7 @@ def _on_ship(ship, mesh, scale, heel):
 
 
 def _lying(tank, plate_m, scale):
+    """`LyingTank` inside the plates, with scaled lengths."""
     return LyingTank(
         width_m=scale * (tank.width_m - 2 * plate_m),
         height_m=scale * (tank.height_m - 2 * plate_m),

@@ -239,6 +239,7 @@ def _on_its_bottom(job, wall, shell, zero, parts):
 
 
 def _bottom(job, wall, shell):
+    """Part of the bottom, by its form."""
     from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
 
     bottom, low = job.bottom, job.datum.bottom_z_m
@@ -263,6 +264,7 @@ def _footprint(wall, shell):
 
 
 def _head(job, shell, zero, highest_m):
+    """Part of the deformation by the liquid head."""
     survey = job.survey
     return liquid_head(
         shell.volume,
@@ -300,6 +302,7 @@ def _survey_level_m(survey, zero):
 
 
 def _roof(job, zero):
+    """Part of the floating roof; its heights are dips, `zero` the level of dip 0."""
     roof = job.roof
     return floating_roof(
         roof.mass_kg,
@@ -311,6 +314,21 @@ def _roof(job, zero):
 
 
 def _shell(job, wall, switches, uncertain):
+    """`ShellPart` of a wall.
+
+    Parameters
+    ----------
+    job : Job
+    wall : Wall
+    switches
+        Enabled corrections.
+    uncertain : bool
+        Whether to propagate the uncertainty of the wall.
+
+    Returns
+    -------
+    ShellPart
+    """
     scale = thermal_scale(job, switches)
     stretch = scale if job.table.height_expansion else 1.0
     leaning = np.hypot(1.0, wall.shell.tilt)  # horizontal section over section square to the axis
@@ -348,11 +366,11 @@ def _factors(job, wall, volume, features):
     """`Factor`s of the features of the shell: from readings, and from unseen form by kind."""
     return (
         *wall.factors(job, features.weights),
-        *_of_the_unseen(wall, volume, features, _declared(job), scanned=bool(job.clouds)),
+        *_factors_of_unseen(wall, volume, features, _declared(job), scanned=bool(job.clouds)),
     )
 
 
-def _of_the_unseen(wall, volume, features, declared, *, scanned):
+def _factors_of_unseen(wall, volume, features, declared, *, scanned):
     """`Factor` of each kind of component that the survey does not fully determine.
 
     A declared barrel or taper is not counted again. Points may miss seams, and their readings
@@ -362,18 +380,18 @@ def _of_the_unseen(wall, volume, features, declared, *, scanned):
     assumed, factors = wall.field.amplitudes.assumed_share(), []
     top = volume.weights_m([volume.height_m])[0]
     for kind in KINDS:
-        chosen = [
+        indices = [
             index
             for index, component in enumerate(COMPONENTS)
             if component.kind == kind
             and component.declared_as not in declared
             and (component.shape == "mean" or wall.field.stated)
         ]
-        if chosen:
-            parts = [features.unseen(index) for index in chosen]
-            assumed_shares = assumed[chosen]
+        if indices:
+            parts = [features.unseen(index) for index in indices]
+            assumed_shares = assumed[indices]
             if kind == "seams" and not scanned:
-                parts.append(_of_hidden_seams(features, top, sum(parts)))
+                parts.append(_hidden_seams_m2(features, top, sum(parts)))
                 assumed_shares = np.append(assumed_shares, 1.0)
             factors.append(
                 factor_of_unseen(kind, parts, [top @ part @ top for part in parts], assumed_shares)
@@ -381,7 +399,7 @@ def _of_the_unseen(wall, volume, features, declared, *, scanned):
     return tuple(factor for factor in factors if factor.columns.shape[1])
 
 
-def _of_hidden_seams(features, top, known_m2):
+def _hidden_seams_m2(features, top, known_m2):
     """Covariance (f, f) by which the known seams fall short of those that points may miss, m2."""
     hidden = features.hidden_seams()
     least = max(top @ hidden @ top, 1e-30)
