@@ -11,9 +11,8 @@ from math import ceil, floor, log10
 import matplotlib
 from matplotlib.figure import Figure
 
-logging.getLogger("matplotlib").setLevel(
-    logging.ERROR
-)  # keeps remarks on the font cache out of reports
+# Keeps remarks on the font cache out of reports.
+logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 STYLE = {
     "font.family": ["STIXGeneral", "DejaVu Serif"],

@@ -38,9 +38,8 @@ class ReadWall:
     places: np.ndarray
     tested: Tested
     field: WallField
-    inner_m: np.ndarray | float = field(
-        default=0.0, kw_only=True
-    )  # plate thickness, not in the field
+    # Plate thickness, not in the field.
+    inner_m: np.ndarray | float = field(default=0.0, kw_only=True)
     surveyed_as = "read"  # in addition to points; subclasses state their own kind
 
     def radius_at(self, course, level_m):
@@ -84,9 +83,8 @@ class ReadWall:
             kappa = u^2 c' P y,   variance u^2 - u^4 c' P c.
         """
         collimations, accepted = {}, self.accepted
-        unknowns = columns_of(
-            [reading.free for reading in self.readings]
-        )  # the last of `Sites.shared`
+        # The last of `Sites.shared`.
+        unknowns = columns_of([reading.free for reading in self.readings])
         for index, (kind, name) in enumerate(unknowns, start=-len(unknowns)):
             if kind == "collimation":
                 values, covariance = self.field.shared

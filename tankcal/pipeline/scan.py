@@ -104,9 +104,8 @@ def fit_scan(job, dof=np.inf):
         if np.array_equal(is_near, is_used):
             break
         is_used = is_near
-    _refuse_scatter(
-        job, fit, values, residuals[is_used]
-    )  # before points in groups can define a wall of their own
+    # Before points in groups can define a wall of their own.
+    _refuse_scatter(job, fit, values, residuals[is_used])
     if job.snooping:
         is_candidate = is_used | (np.abs(residuals) <= NEVER_PART * fit.radius_m + NEVER_M)
         is_candidate &= decided >= 0

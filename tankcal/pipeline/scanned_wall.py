@@ -115,6 +115,7 @@ def scanned_wall(job, fitted, chosen, covariance_m2, dof):
     estimate = field.estimated(functionals, by_shape)
     rows, of_sizes = slice(NODES), slice(NODES, NODES + len(fitted.names))
     top, bottom = estimate.departing[-2:]
+    # The mean of the field over the wall changes the sizes; the form keeps only the remainder.
     wider = estimate.departing[of_sizes]
     causes, index = job.points.causes, coordinates_of(chosen)
     moves = [readings.by_points @ cause.column_m[index] for cause in causes]
@@ -294,14 +295,15 @@ def _functionals(job, fitted, solid, places, levels_m, area_m2, chosen):
     begin = dip - solid.dip_from_a_m
     radius, cells, around = solid.width_m / 2, cells_along(begin, solid.length_m), cells_around()
     rise = np.hypot(1.0, solid.tilt) if solid.dip_direction == "plumb" else 1.0
+    # Height of the free surface above the axis at each cell of a tilted cylinder.
     axis = rise * levels_m[:, None] - radius - solid.tilt * (cells - dip)
     cell = radius * FULL_TURN / len(around) * solid.length_m / len(cells)
     volumes = cell * wet_cells(axis, radius).transpose(0, 2, 1)
     shape = len(around), len(cells)
     mean, top = np.full(shape, 1 / (shape[0] * shape[1])), np.zeros(shape)
-    half_chord = np.sqrt(
-        np.maximum(radius**2 - axis[-2] ** 2, 1e-12)
-    )  # the free surface near the top
+    # The free surface near the top.
+    half_chord = np.sqrt(np.maximum(radius**2 - axis[-2] ** 2, 1e-12))
+    # The wall at the top is its mean along the crown, weighted by the width of the free surface.
     top[len(around) // 2] = half_chord / half_chord.sum()
     zero = np.zeros(shape)
     weights = np.concatenate([volumes, [2 * mean, zero, top, zero]])

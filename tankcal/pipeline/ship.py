@@ -17,9 +17,8 @@ from tankcal.uncertainty import combine
 STEPS_M = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 ABOUT = 100  # largest number of steps of a table without a given step
 MOST = 400_000  # largest number of corrections
-SLACK_M = (
-    0.01  # that the lower end of a pipe may stand below the mesh, or its upper end below the top
-)
+# Tolerance of a pipe that ends below the mesh or below the top of the tank.
+SLACK_M = 0.01
 OF_SHIP = ("trim", "list")  # inputs without effect at even keel
 CLOSE = 1e-9  # fall of a volume, relative to the capacity, that counts as rounding
 CORRECTING = message("correcting_soundings", "correcting soundings for trim and list")

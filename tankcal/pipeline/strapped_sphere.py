@@ -92,6 +92,7 @@ class StrappedSphere:
         """
         diagonal = np.diag(self.fit.precision)
         covariance_diagonal = np.diag(np.linalg.inv(self._lengths_m2))
+        # Leave-one-out test: w = P v / sqrt(P_ii), undefined where P_ii vanishes.
         pull = -self.fit.precision @ self.fit.residuals_m
         is_determined = diagonal > 1e-6 * covariance_diagonal
         return np.where(
@@ -108,6 +109,7 @@ class StrappedSphere:
         shared = sum(effect.by_m**2 for effect in reading.effects)
         of_fit = derivative @ self.fit.weights
         prior = derivative @ self.fit.by_prior
+        # The form at the check, the fitted ellipsoid and its prior are independent contributions.
         variance = form + of_fit @ self._lengths_m2 @ of_fit.T + prior @ prior.T
         return float(np.sqrt(variance[0, 0] + reading.sd_m**2 + shared))
 

@@ -49,9 +49,7 @@ def check_strapped(job, wall):
         *check_tapes(job, straps),
         *check_repeats(straps),
         *_check_pairs(job, straps),
-        *(
-            _check_courses(job, straps) if job.radii is None else ()
-        ),  # otherwise not all courses were strapped
+        *(_check_courses(job, straps) if job.radii is None else ()),
         *_check_first_course(job, straps),
         *_check_single_course(job, straps),
         *_check_uncontrolled(job, wall),
@@ -277,9 +275,8 @@ def _check_courses(job, straps):
         yield _problem(text)
     share = limits_of("nominal_size")["share"] * nominal
     strapped = {reduced_strap.strap.course for reduced_strap in straps.reduced}
-    strapped_courses = [
-        i for i, name in enumerate(names) if name in strapped
-    ]  # lines determine the other courses
+    # Lines determine the other courses.
+    strapped_courses = [i for i, name in enumerate(names) if name in strapped]
     exchanged = exchanged_courses(straps.radius_m, plates, strapped_courses)
     discrepant = {
         name: radius - median
@@ -320,7 +317,7 @@ def _far_from_others(straps, names, inside_m):
     """
     least = FAR_REPEATS * limit_of_repeats(float(np.median(straps.circumference_m)))
     discrepant = course_apart(inside_m, least / straps.per_radius)
-    reported = {one.strap.course for _, one, _, _ in straps_apart(names, straps)}
+    reported = {strap.strap.course for _, strap, _, _ in straps_apart(names, straps)}
     return (
         {}
         if discrepant is None or names[discrepant[0]] in reported

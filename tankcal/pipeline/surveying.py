@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from tankcal.survey.sighting import Sighting
     from tankcal.survey.tangents import Touching
 
-# Each kind of survey is imported where a job has it: most jobs have one, and all take long to load.
+# Each kind of survey is imported when needed: most jobs have one kind, and all are slow to load.
 
 TOLD = 10  # warnings of the adjustment repeated when no wall is found
 

@@ -76,9 +76,11 @@ def judge_tangents(job, wall, touching):
         return TangentTests(used, departure, w, redundancy, mdb, {})
     sight = adjusted[wall.accepted[order]]  # sight of each reading of the field
     field = wall.field
+    # A field of points alone has its noise section by section; the tests include all covariances.
     covariance = field.covariance_m2 + noise_of_wall(wall) - field.noise_m2
     precision, pull = tested(field, covariance, sites)
     weight = np.maximum(np.diag(precision), 1e-300)
+    # Leave-one-out discrepancy P y / P_ii, and w = P y / sqrt(P_ii), as in data snooping.
     departure[sight], w[sight] = pull / weight, pull / np.sqrt(weight)
     variance_m2 = (job.tangents.sd_rad * touching.length_m) ** 2 + touching.hull.own_sd_m**2
     redundancy[sight] = np.clip(variance_m2[sight] * weight, 0, 1)

@@ -154,6 +154,8 @@ def _hull_of(job, touching, wall):
         support = support_of(outline)
         step = FULL_TURN / len(outline)
         index = np.rint(touching.normal_rad[is_of_level] / step).astype(int) % len(outline)
+        # The support function is the distance of the tangent from the centre; its excess is over
+        # the radius.
         excess_m[is_of_level] = (support - outline)[index]
         # Central difference of the support function with respect to azimuth.
         slope_m[is_of_level] = (np.roll(support, -1) - np.roll(support, 1))[index] / (2 * step)

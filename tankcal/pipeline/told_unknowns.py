@@ -119,6 +119,7 @@ def told_unknowns(points, unbound, field, parts):
         largest_m=float(np.abs(moved @ values).max(initial=0.0)),
         by_readings=by_readings,
         moved_m=moved,
+        # D S D' is split into two halves, one in each of D A' and A D'.
         with_points_m2=moved @ spread / 2 - covariance @ (by_points.T @ by_readings.T),
     )
 
@@ -141,6 +142,7 @@ def _determined_combinations(spread, count):
     ndarray, shape (s, q)
     """
     across, of_offsets = spread[count:, :count], spread[:count, :count]
+    # Schur complement: covariance of the poses for given offsets.
     variances, axes = np.linalg.eigh(
         spread[count:, count:] - across @ np.linalg.pinv(of_offsets) @ across.T
     )

@@ -61,6 +61,7 @@ def factors_of_undecided(halves):
     """
     if not np.any(halves):
         return ()
+    # One part per column and one common part give equal correlations `ALIKE`.
     separate, common = (
         np.sqrt(1 - ALIKE) * halves,
         np.sqrt(ALIKE) * halves.sum(axis=1, keepdims=True),

@@ -72,9 +72,8 @@ class Unbound:
                     " (circumferences.csv), or tie them by targets",
                 )
             )
-        columns = (
-            self.poses @ directions[size > LEAST_MOTION_M].T
-        )  # full columns, not residuals: the radii keep their meaning
+        # Full columns, not residuals: the radii keep their meaning.
+        columns = self.poses @ directions[size > LEAST_MOTION_M].T
         return replace(sites, shared=np.hstack([self.offsets, columns]))
 
     def ways_of(self, sites):

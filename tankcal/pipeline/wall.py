@@ -121,6 +121,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
         If a course has too few points.
     """
     accepted = np.flatnonzero(shell.on_wall)
+    # Course heights are along the leaning shell, point heights along the vertical.
     joints = joints_of(job) / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(tilt)
     groups = _groups(job, shell, accepted, joints)
     sds, estimated = radial_sds(job.points), noise_is_estimated(job)
@@ -131,6 +132,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     nominal = job.tank.nominal_diameter_m / 2
     samples = [sample_of(*section) for section in to_fit]
     of_wall = {"welds_rad": _welds(job), "spans": spans_of(joints), "smoothed": is_smoothed(job)}
+    # Many points are averaged in cells; `means` are the weights, the identity for few points.
     sites, means = _sites(groups, samples, nominal, of_wall)
     # Undecided columns enter midway between the wall with and without them.
     undecided = means @ undecided_halves(shell, accepted, groups)
@@ -139,9 +141,8 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     is_known = amplitudes is not None
     amplitudes = amplitudes if is_known else sizes
     if amplitudes is None:
-        measured_sites = sites.take(
-            np.ones(len(sites), dtype=bool)
-        )  # without courses that lack points
+        # Without courses that lack points.
+        measured_sites = sites.take(np.ones(len(sites), dtype=bool))
         amplitudes = estimate_amplitudes(
             measured_sites,
             radius,
@@ -201,9 +202,8 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
         straps=straps,
         read=read,
         by_inputs=by_inputs,
-        without_inputs=("offset",)
-        if job.hits or job.clouds
-        else (),  # instruments have offsets of their own
+        # Hits and clouds have instrument offsets of their own.
+        without_inputs=("offset",) if job.hits or job.clouds else (),
         origins_m=np.array([sample.centre_m for sample in samples]),
         told=told,
     )

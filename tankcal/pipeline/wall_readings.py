@@ -293,6 +293,7 @@ def settle_readings(field, field_of, parts, may_go):
     accepted = np.ones(len(radius), dtype=bool)
     for _ in range(MOST_ROUNDS):
         covariance = replace(field, sites=sites, radius_m=radius, noise_m2=noise).covariance_m2
+        # The weight matrix with free parameters eliminated is needed for leave-one-out tests.
         precision = restricted_precision(covariance, free_design(sites)[0])
         pull, most = (
             precision @ (radius - radius.mean()),

@@ -40,7 +40,7 @@ from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
 # Least number of circumferences to reject one if they alone determine an offset of the points: of
 # two contradictory circumferences either may be wrong.
 FEWEST_CIRCUMFERENCES = 3
-MOST_OF_RING = 200  # largest number of points of a ring used for the area term
+MOST_OF_RING = 200  # largest number of points of a ring for area term and hull
 
 
 @dataclass(frozen=True)
@@ -96,9 +96,8 @@ def rings_of(points):
     rings, sites = [], points.sites
     for ring in np.unique(sites.ring[sites.ring >= 0]):
         of_ring = np.flatnonzero(sites.ring == ring)
-        of_ring = of_ring[
-            np.argsort(sites.azimuth_rad[of_ring] % FULL_TURN)
-        ]  # the drawing depends on this order
+        # The simulated outlines depend on this order.
+        of_ring = of_ring[np.argsort(sites.azimuth_rad[of_ring] % FULL_TURN)]
         of_ring = of_ring[:: -(-len(of_ring) // MOST_OF_RING)]
         noise = points.noise_m2[np.ix_(of_ring, of_ring)]
         relative_height = float(sites.heights.up[of_ring].mean())
@@ -244,9 +243,8 @@ def join_readings(job, points, amplitudes, joints_m, *, is_known):
         strapping = job.strapping
         reduced = reduce_straps(strapping, job.survey.shell_temperature_c, 2 * nominal)
         places = [i for i, reduced_strap in enumerate(reduced) if not reduced_strap.strap.check]
-        points_with_form = (
-            None if is_known else points
-        )  # points of a plan are nominal, without form
+        # Points of a plan are nominal, without form.
+        points_with_form = None if is_known else points
         term, shape = area_term(strapping.shape_sd_m, amplitudes, nominal, points_with_form)
         readings = readings_of_straps([reduced[i] for i in places], names, term)
         tape_results = reduced, term, shape
@@ -317,8 +315,11 @@ def _joined_field(job, points, readings, amplitudes, heights):
         name: np.append(points.by_inputs.get(name, np.zeros(n)), columns.get(name, np.zeros(k)))
         for name in dict.fromkeys((*points.by_inputs, *columns))
     }
+    # Readings and points are independent, except for declared inputs such as plates and
+    # temperature.
     noise = scipy.linalg.block_diag(points.noise_m2, noise_of(readings))
     noise += noise_by_inputs(job.inputs, columns, n + k)
+    # If straps alone determine a free offset, two of them cannot show which is wrong.
     straps_may = is_bound or _circumferences(job) >= FEWEST_CIRCUMFERENCES
     may = [
         job.snooping and reading.of != FORMER and (straps_may or reading.of == "offsets")
@@ -326,6 +327,7 @@ def _joined_field(job, points, readings, amplitudes, heights):
     ]
     may_go = np.append(np.zeros(n), may)
 
+    # Rings of offsets have centres of their own, which are not part of the outlines of the points.
     apart = points.unbound.first_apart
     if apart is None:
         apart = int(points.sites.ring.max(initial=-1)) + 1
@@ -353,6 +355,7 @@ def _joined_field(job, points, readings, amplitudes, heights):
     )
     field = field_of(accepted_at_first > 0)
     if np.any(sites.ring >= 0):
+        # The centres of the rings are known only from a first solution.
         readings = off_centre(readings, field)
         radius = np.append(points.radius_m, [reading.radius_m for reading in readings])
         field = field_of(accepted_at_first > 0)

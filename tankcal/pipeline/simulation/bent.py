@@ -115,6 +115,7 @@ def simulate_bent(rest, distributions, added_m3, below, goal):
     Simulation
     """
     inputs = inputs_of(distributions, None) if distributions else None
+    # Independent randomised sets give the standard error of each estimate from their scatter.
     seeds = np.random.SeedSequence(goal.seed).spawn(SETS)
     sets = [
         inputs.draws(sobol_points(COUNT, len(distributions), seed))[0]
@@ -139,7 +140,7 @@ def simulate_bent(rest, distributions, added_m3, below, goal):
     count = len(rest.value)
     return Simulation(
         **dict(zip(ESTIMATES, means, strict=True)),
-        **{f"se_{name}": draws for name, draws in zip(ESTIMATES, errors, strict=True)},
+        **{f"se_{name}": error for name, error in zip(ESTIMATES, errors, strict=True)},
         tolerance=numerical_tolerance(means[1], goal.digits),
         reached=np.full(count, True),
         draws=np.full(count, SETS * COUNT),
@@ -155,10 +156,13 @@ class _Law:
         mass = np.diff(below)
         first, last = added[:-1], added[1:]
         self.mean = float(mass @ (first + last) / 2)
+        # Second moment of a variable uniform between the ends of a piece.
         square = mass @ (first**2 + first * last + last**2) / 3
         self.variance = max(float(square - self.mean**2), 0.0)
         low, high = np.minimum(first, last), np.maximum(first, last)
         is_constant = high - low <= 1e-12 * max(np.abs(added).max(), 1e-300)
+        # The density is a step function: it rises at the lower end of each piece, falls at its
+        # upper end.
         density = mass[~is_constant] / (high - low)[~is_constant]
         zeros = np.zeros(np.count_nonzero(is_constant))
         place = np.concatenate([low[~is_constant], high[~is_constant], low[is_constant]])
@@ -166,8 +170,11 @@ class _Law:
         jumps = np.concatenate([0 * density, 0 * density, mass[is_constant]])
         order = np.argsort(place, kind="stable")
         self.place = place[order]
+        # Integrating the steps gives the linear parts of the distribution function; atoms are
+        # jumps.
         straight = np.cumsum(steeper[order])[:-1] * np.diff(self.place)
         self.below = np.concatenate([[0.0], np.cumsum(straight)]) + np.cumsum(jumps[order])
+        # Rounding may not make the distribution function decrease or leave 0 to 1.
         self.below = np.maximum.accumulate(np.clip(self.below / self.below[-1], 0, 1))
 
     def cdf(self, y):
@@ -203,6 +210,8 @@ def _ends(law, of_rest, probability):
     ends_of_sets = np.empty((len(of_rest), 4))
     y = [np.quantile(pilot, tails), np.quantile(pilot, 1 - tails[::-1])]
     for ends, rest in zip(ends_of_sets, of_rest, strict=True):
+        # Averaging the exact probabilities over the draws of R gives P(V <= y), smoother than
+        # counting.
         below = [law.cdf(values[:, None] - rest).mean(axis=1) for values in y]
         low = np.interp(tails, np.maximum.accumulate(below[0]), y[0])
         high = np.interp(tails + probability, np.maximum.accumulate(below[1]), y[1])

@@ -226,6 +226,7 @@ def _by_input(job, survey, body, levels_m, picked, name, declared):
         return {}
     for share in STEPS:
         try:
+            # Smaller steps if a tank with the full step does not exist.
             ends = _slopes_of_moved(job, survey, levels_m[picked], name, share * declared[name])
         except SolutionError:  # no such tank exists, so such an error is impossible
             continue
