@@ -80,6 +80,7 @@ def departure_of_size(job, inside_m, plate_m, sd_m=0.0):
     float
     """
     nominal = nominal_radius_m(job, plate_m)
+    # An unstated diameter may be inside or outside, so any radius between the two is accepted.
     least = nominal if job.diameter_is is not None else nominal - plate_m
     miss = inside_m - min(max(inside_m, least), nominal)
     return miss if abs(miss) > allowed_departure_m(job, sd_m) else 0.0

@@ -212,6 +212,8 @@ def _subtract_shared(causes, shared_m):
                 most=1000 * shared_m / np.sqrt(norm2),
             )
         )
+    # Rank-one square root of I - a a', applied from the right: F (I - (1 - sqrt(1 - a'a)) a a' /
+    # a'a).
     remaining = columns - (1 - np.sqrt(1 - norm2)) / norm2 * np.outer(columns @ a, a)
     ends = np.cumsum([cause.columns.shape[1] for cause in causes])[:-1]
     parts = np.split(remaining, ends, axis=1)

@@ -188,6 +188,8 @@ def exchanged_rings(outside_m, plates_m, thickness_m, laps):
         orders = [np.zeros(count, dtype=bool), first, ~first]
     else:
         orders = [np.array([lap == "outer" for lap in laps])]
+    # In the true order, outer rings are wider by the inner plates; after subtraction no step
+    # remains.
     shifts = [outer * _inner_plates(thickness_m, outer) for outer in orders]
     inside = outside_m - plates_m
     steps = [np.abs(np.diff(inside - shift)).sum() for shift in shifts]

@@ -108,6 +108,7 @@ class RingFeatures:
         return np.pad(rows, padding)
 
     def _padded(self, factor):
+        """A `Factor` of radii and the bottom, with zero rows for the waves."""
         return factor.mapped(self._with_waves)
 
     def _factors_of_bulges(self):
@@ -132,6 +133,8 @@ class RingFeatures:
         radius = float(np.mean(self._wall.radius_m))
         orders = np.arange(2.0, OVALITY_MODES[-1] + 1)
         for name, kind in KIND_OF_WAVES.items():
+            # `FLATTENED` of the variance is wave 2 of all rings; the rest has the spectrum of the
+            # components.
             spectrum = mode_shares(orders, radius)[name]
             columns = [
                 *self._waves(np.sqrt(shares[name, True] * spectrum), common=True),
@@ -155,6 +158,7 @@ class RingFeatures:
                 yield column
         if len(sds_m) > len(WAVES):
             column = np.zeros(count)
+            # Shorter waves are independent, so their variances add at the bottom of the dip.
             column[self._rings] = np.sqrt(np.sum(sds_m[len(WAVES) :] ** 2))
             yield column
 

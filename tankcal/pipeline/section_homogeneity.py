@@ -219,5 +219,6 @@ def warn_of_sections(job, wall):
 
 def _ratio(test):
     """Variance over the stated one: about the circle if too small, else apart from the form."""
+    # Form can only add to the scatter about the circle, so a ratio below 1 there is due to noise.
     about_circle = test.chi2 / test.chi2_dof
     return about_circle if about_circle < 1 else test.factor

@@ -199,6 +199,7 @@ def _printed(intervals, simulation):
     delivered = simulation.delivered
     U = delivered.U_m3
     printed = simulation.of_delivered.U_m3
+    # Deliveries that were not simulated get the largest ratio of the smooth simulated deliveries.
     ratio = np.divide(printed, U, out=np.ones(len(U)), where=U > 0)
     factor = np.max(ratio[simulation.smooth], initial=1.0)
     pairs = zip(delivered.low_m.tolist(), delivered.high_m.tolist(), strict=True)

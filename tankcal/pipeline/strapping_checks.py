@@ -72,8 +72,8 @@ def strapped_together(wall):
     Repeats support each other, so that no single repeat appears discrepant. Let P be the reduced
     weight matrix of the readings y, with the free parameters eliminated. Let a be 1 for the
     readings of one circumference and 0 elsewhere. Their radius differs from the other readings by
-    a' P y / a' P a, and this is sqrt(a' P a) times as large in units of its standard deviation
-    (Cook & Weisberg 1982).
+    a' P y / a' P a. The test statistic w is this difference times sqrt(a' P a) (Cook & Weisberg
+    1982).
 
     Returns
     -------
@@ -82,8 +82,8 @@ def strapped_together(wall):
     """
     straps, names = wall.straps, {}
     adjusted = straps.adjusted[straps.accepted]
-    for indices, place in enumerate(adjusted, len(wall.field.radius_m) - len(wall.readings)):
-        names.setdefault(straps.reduced[place].strap.name, []).append((indices, place))
+    for index, place in enumerate(adjusted, len(wall.field.radius_m) - len(wall.readings)):
+        names.setdefault(straps.reduced[place].strap.name, []).append((index, place))
     repeated = [repeats for repeats in names.values() if len(repeats) > 1]
     if not repeated:
         return {}
@@ -91,10 +91,10 @@ def strapped_together(wall):
     precision, pull = tested(wall.field, wall.field.covariance_m2, count)
     discrepant = {}
     for repeats in repeated:
-        indices = [index for index, _ in repeats]
-        weight = precision[np.ix_(indices, indices)].sum()
+        index = [number for number, _ in repeats]
+        weight = precision[np.ix_(index, index)].sum()
         if weight > 1 / FARTHEST_M**2:  # otherwise uncontrolled
-            departure = pull[indices].sum() / weight
+            departure = pull[index].sum() / weight
             discrepant[repeats[0][1]] = float(departure * np.sqrt(weight)), float(departure)
     return discrepant
 

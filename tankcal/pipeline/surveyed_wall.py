@@ -167,8 +167,8 @@ class Wall:
     def read_with(self, weights):
         """Derivatives (f,) of features by inputs on which points and readings depend.
 
-        Such inputs are plates through which points on the other side were moved, the temperature
-        that a tape shares with the shell, and plates that inside points do not see.
+        The inputs are plates between the points and the other side, and the temperature that a tape
+        shares with the shell. Inside points do not see plates.
         """
         derivatives = inputs_read_with(self.readings, weights[:, self.points_read :])
         for name, column in self.by_inputs.items():

@@ -132,8 +132,8 @@ def _mean_change(before, after):
 def _hull_of(job, touching, wall):
     """`Hull` of a wall at the tangents from which the wall was fitted.
 
-    The excess at a tangent is that of the estimated outline at its azimuth, plus the mean excess of
-    the form that the tangents do not show.
+    The excess at a tangent has two parts: the excess of the estimated outline at its azimuth, and
+    the mean excess of the form that the tangents do not show.
     """
     field, joints = wall.field, wall.joints_m
     heights = touching.points.xyz_m[:, 2] - job.datum.bottom_z_m

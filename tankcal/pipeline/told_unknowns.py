@@ -1,8 +1,9 @@
 """Unknowns shared by the points of a wall, as estimated with the wall, and their uncertainty.
 
-Offsets without a prior and the poses of untied set-ups, u, are unknowns of the wall. Let D (3m, s)
-be the derivative of the points p by the estimates t = G y, with y the radii, B = dy/dp, and C the
-covariance of the points alone. After subtraction of t the points have the covariance
+Offsets without a prior and the poses of untied set-ups, u, are unknowns of the wall. Their
+estimates are t = G y, with y the radii of the wall. Let B = dy/dp be the derivative of the radii by
+the points p, and C the covariance of the points alone. Let D (3m, s) be the derivative of the
+points by t. After subtraction of t the points have the covariance
 
     C + D S D' - C B' G' D' - D G B C = C + D A' + A D',   A = D S / 2 - C B' G',
 

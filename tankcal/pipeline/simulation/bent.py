@@ -1,8 +1,8 @@
 """Simulation of volumes that no parabola approximates under the error of the datum.
 
-Such volumes are near the empty tank and at edges. They are V = g(t) + R, with g(t) the volume of
-the tank at a dip moved by t u, and R the remainder, which does not depend on the dip. The
-distribution of g(t) is known without draws as a piecewise linear function. With draws of R,
+Such volumes are near the empty tank and at edges. They are the sum V = g(t) + R. The volume of the
+tank at a dip moved by t u is g(t). The remainder R does not depend on the dip. The distribution of
+g(t) is known without draws as a piecewise linear function. With draws of R,
 
     P(V <= y) = mean of P(g(t) <= y - R).
 

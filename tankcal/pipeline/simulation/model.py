@@ -94,9 +94,17 @@ MOST_ROWS, MOST_BENT, MOST_PLAIN = 800, 60, 40
 
 
 class Model:
-    """Volumes of the rows, then of deliveries (weights (deliveries, rows) times the rows).
+    """Volumes of a table and of its deliveries as functions of independent coordinates.
 
-    A coordinate is in units of the u of its input, so that a slope is a contribution in m3.
+    The volumes of the rows come first, then those of the deliveries. A coordinate is in units of
+    the u of its input, so that a slope is a contribution in m3.
+
+    Parameters
+    ----------
+    job, survey, body, zero_m, table
+        Origin of the table, as in `result.Result`.
+    weights : ndarray, shape (deliveries, rows)
+        Weights of the rows in the volumes of the deliveries.
     """
 
     def __init__(self, job, survey, body, zero_m, table, weights):
@@ -135,6 +143,7 @@ class Model:
         u = np.linalg.norm(self.inputs.slopes, axis=1)
         all_volumes = spread_to_all(simulation, places, self.quadratic.value, u, goal.digits)
         endless = [not np.isfinite(distribution.sd) for distribution in self.inputs.distributions]
+        # A volume that depends on an input without a finite variance has no standard uncertainty.
         without_u = np.any(self.inputs.slopes[:, endless] != 0, axis=1)
         all_volumes = replace(all_volumes, u=np.where(without_u, np.inf, all_volumes.u))
         return all_volumes, int(np.count_nonzero(places < self.rows))
@@ -153,8 +162,10 @@ class Model:
         """`QuadraticRows` of all volumes, from slopes and second derivatives."""
         count, pairs = len(self.inputs.distributions), self.curved.pairs
         hessians = np.zeros((max(len(pairs), 1), count, count))
-        for hessian, (first, second_input) in zip(hessians, pairs, strict=False):
-            i, j = self.inputs.place[first], self.inputs.place[second_input]
+        for hessian, (first_input, second_input) in zip(hessians, pairs, strict=False):
+            i, j = self.inputs.place[first_input], self.inputs.place[second_input]
+            # H is symmetrised; together with the factor 1/2 of the Taylor series each half counts
+            # 1/4.
             hessian[i, j] += 0.25
             hessian[j, i] += 0.25
         second = self.curved.values if pairs else np.zeros((self.rows, 1))
@@ -222,7 +233,7 @@ def spread_to_all(found, places, value_m3, u_m3, digits):
     """Simulation of all volumes from that of the volumes at `places`.
 
     Between simulated volumes all estimates are interpolated linearly, relative to the u of the law
-    of propagation, because volumes of neighbouring rows have nearly the same distribution.
+    of propagation. Volumes of neighbouring rows have nearly the same distribution.
 
     Parameters
     ----------
