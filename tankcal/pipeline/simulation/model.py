@@ -164,8 +164,6 @@ class Model:
         hessians = np.zeros((max(len(pairs), 1), count, count))
         for hessian, (first_input, second_input) in zip(hessians, pairs, strict=False):
             i, j = self.inputs.place[first_input], self.inputs.place[second_input]
-            # H is symmetrised; together with the factor 1/2 of the Taylor series each half counts
-            # 1/4.
             hessian[i, j] += 0.25
             hessian[j, i] += 0.25
         second = self.curved.values if pairs else np.zeros((self.rows, 1))
