@@ -1,6 +1,6 @@
-"""A checked subset of LaTeX mathematics, set as typst and as MathML.
+"""Conversion of a subset of LaTeX mathematics to typst and MathML.
 
-An unknown macro or character is an error: nothing that a reader did not intend is ever printed.
+An unknown macro or character is an error, so that no formula is printed incorrectly.
 """
 
 import re
@@ -66,12 +66,13 @@ _FUNCTIONS = ("sin", "cos", "tan", "arctan", "ln", "log", "exp", "min", "max")
 _SPACES = {",": "thin", ";": "med", "quad": "quad", " ": "space"}
 _ACCENTS = {"bar": ("overline", "¯"), "hat": ("hat", "^")}
 _OPERATORS = "+-=()[]|/<>,.!':"
+# Groups of a token: macro, number, other character, white space.
 _TOKEN = re.compile(r"\\([A-Za-z]+|.)|([0-9]+(?:(?:\.|\{,\})[0-9]+)?)|(\S)|(\s+)", re.DOTALL)
 
 
 @dataclass(frozen=True)
 class Formula:
-    """One formula: its LaTeX source, and the same for typst's math mode and as MathML."""
+    """A formula as LaTeX source, in the math mode of typst, and as MathML."""
 
     latex: str
     typst: str
@@ -79,14 +80,14 @@ class Formula:
 
 
 def formula(latex):
-    """Read `latex`; raises TankcalError naming what is not in the subset."""
+    """Convert LaTeX source into a Formula; raise TankcalError for syntax outside the subset."""
     reader = _Reader(latex)
     typst, mathml = reader.sequence(until=None)
     return Formula(latex.strip(), typst, f"<mrow>{mathml}</mrow>")
 
 
 class _Reader:
-    """A recursive reader; every method returns (typst, MathML) of what it has read."""
+    """Recursive parser; the methods return (typst, MathML) of the parsed part."""
 
     def __init__(self, latex):
         self.latex = latex
@@ -131,7 +132,7 @@ class _Reader:
         if macro:
             return self.macro(macro)
         if number:
-            typst = number.replace("{,}", ' class("normal", \\,) ')  # no gap behind the comma
+            typst = number.replace("{,}", ' class("normal", \\,) ')  # no space after the comma
             return typst, f"<mn>{number.replace('{,}', ',')}</mn>"
         if character == "{":
             inner = self.sequence(until="}")
@@ -177,7 +178,7 @@ class _Reader:
         return self.atom()
 
     def words(self):
-        """The text of \\text{...}, taken from the source as it stands."""
+        """Convert the text of \\text{...}, which is taken unchanged from the source."""
         if self.peek() != "{":
             self.refuse("'{' expected")
         start = self.tokens[self.at].end()
