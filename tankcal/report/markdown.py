@@ -1,4 +1,4 @@
-"""Markdown cells as plain nodes: {"t": kind, ...}, for the PDF and the HTML alike."""
+"""Conversion of markdown cells into nodes {"t": kind, ...} for the PDF and the web page."""
 
 import mistune
 
@@ -17,10 +17,10 @@ _WRAPPERS = {
 
 
 def nodes(source):
-    """The nodes of a markdown text.
+    """Return the nodes of a markdown text (list of dict).
 
-    HTML inside it is printed as it is written, a link of an unusual kind as its text. Raises
-    TankcalError for what the report cannot show: images, unknown mathematics.
+    HTML is printed as text. A link with an unusual scheme is reduced to its text. Images and
+    unknown mathematics raise TankcalError.
     """
     parse = mistune.create_markdown(renderer=None, plugins=["math", "table"])
     return _children(parse(source))

@@ -1,11 +1,11 @@
-"""Former radii on paper: where they come from, how they may have changed, what was found."""
+"""Former radii in the papers: source, assumed change, and results."""
 
 from tankcal.report.radii_source import source_text
 from tankcal.report.tables.radii import RADII
 
 
 def facts(paper):
-    """Source, temperature and common uncertainty of the radii; the change that was declared."""
+    """Block of source, temperature, common uncertainty and assumed change of the radii."""
     radii = paper.record["radii"]
     change = radii["change"] or {}
     return paper.facts(
@@ -21,7 +21,7 @@ def facts(paper):
 
 
 def courses(paper):
-    """The table of courses; beside a new survey with what it found."""
+    """Table of the courses, with the results of a new survey if there is any."""
     change = paper.record["radii"]["change"]
     if change is None:
         return paper.show(RADII)
