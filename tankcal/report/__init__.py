@@ -152,7 +152,7 @@ def set_papers(notebook, directory, parts, progress=None, **parameters):
                 )
         progress(done, total)
 
-    with ThreadPoolExecutor(WORKERS) as pool:  # the typesetter releases Python's lock
+    with ThreadPoolExecutor(WORKERS) as pool:  # the typesetter runs outside Python
         execute(notebook, directory, on_cell, **parameters)
         contents = {"report.ipynb": written(notebook).encode("utf-8")}
         contents["report.html"] = page(blocks_of(notebook)).encode("utf-8")

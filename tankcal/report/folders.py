@@ -106,7 +106,9 @@ def replaced(directory, language=None):
     work = Path(tempfile.mkdtemp(prefix=PREFIX, dir=target.parent))
     try:
         with open(work / LOCK, "w") as lock:
-            with suppress(OSError):  # some network drives have no locks; `recover` fails there
+            with suppress(
+                OSError
+            ):  # some network drives have no locks; `recover` does nothing there
                 lock_file(lock)
             try:
                 new_folder = work / MADE / target.name

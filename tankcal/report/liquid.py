@@ -9,7 +9,7 @@ from tankcal.report.tables import liquid as tables
 
 MOST_ROWS = 16  # rows of the table of volumes in the papers; the workbook has all rows
 MARKERS = "osD^vP*X"  # marker of each run, as matplotlib names it
-BEYOND = 4.0  # height of the frame, in largest U of joint table and liquid
+BEYOND = 4.0  # largest half-height of the frame, in largest |difference| + U without geometry
 COLOURS = {"geometry": FAINT, "liquid": RED, "joint": INK}
 
 

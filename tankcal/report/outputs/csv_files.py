@@ -61,7 +61,7 @@ def _plain(values, factor):
 
 
 def _spread(heading, cells):
-    """A column; lists of one or more as columns of their own: id_1, id_2."""
+    """Return a column; a column of lists becomes several columns, such as id_1 and id_2."""
     if isinstance(cells, Texts) and cells.codes.ndim > 1:
         each = [Texts(codes, cells.texts) for codes in cells.codes.T]
     elif not isinstance(cells, list) or not any(isinstance(cell, list) for cell in cells):
