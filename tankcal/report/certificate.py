@@ -38,14 +38,14 @@ def parties(paper):
         "place": certificate.get("place") or paper.record["job"]["tank"]["details"].get("location"),
         "date_of_issue": paper.day(certificate.get("date_of_issue")),
     }
-    keys = [key for key in _PARTIES if not _in_the_head(paper, key, certificate)]
+    keys = [key for key in _PARTIES if not _is_in_head(paper, key, certificate)]
     additional_keys = [
         key for key in certificate if key not in (*_PARTIES, *_CALIBRATION, *_ELSEWHERE)
     ]
     return _facts(paper, given, [*keys, *additional_keys], (*_WRITTEN_BY_HAND, "date_of_issue"))
 
 
-def _in_the_head(paper, key, certificate):
+def _is_in_head(paper, key, certificate):
     """Return whether the head of the first page prints this entry already."""
     if key == "laboratory":
         return bool(certificate.get(key) or paper.letterhead)

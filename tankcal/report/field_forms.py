@@ -7,10 +7,8 @@ from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
 
 FILE = "field-sheets.pdf"
-BY_PEN = (
-    *(survey for survey in OF_SHELLS if survey != DECLARED),
-    METERED,
-)  # surveys recorded by hand
+# Surveys recorded by hand.
+BY_PEN = (*(survey for survey in OF_SHELLS if survey != DECLARED), METERED)
 FORMS = (  # input tables of each form, read together, and the number of rows on a sheet
     (("rings",), 12),
     (("lines",), 12),

@@ -31,11 +31,8 @@ PREFIX, LOCK, MADE, BEFORE, REST = ".tankcal-", "lock", "made", "before", "rest"
 NEW_S = 60  # age, s, up to which a folder without a lock may belong to a starting process
 EXCHANGE = 2  # RENAME_EXCHANGE of Linux, RENAME_SWAP of macOS
 HERE = -100  # AT_FDCWD of Linux: paths are relative to the working directory
-NO_EXCHANGE = (
-    errno.ENOSYS,
-    errno.EINVAL,
-    errno.ENOTSUP,
-)  # errors of a file system without exchange
+# Errors of a file system without exchange.
+NO_EXCHANGE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)
 
 
 def default_folder(source):
@@ -106,9 +103,8 @@ def replaced(directory, language=None):
     work = Path(tempfile.mkdtemp(prefix=PREFIX, dir=target.parent))
     try:
         with open(work / LOCK, "w") as lock:
-            with suppress(
-                OSError
-            ):  # some network drives have no locks; `recover` does nothing there
+            # Some network drives have no locks; `recover` does nothing there.
+            with suppress(OSError):
                 lock_file(lock)
             try:
                 new_folder = work / MADE / target.name

@@ -211,9 +211,8 @@ def read_saved(path):
                 ),
             )
         ) from error
-    data = (
-        {"mark": None} | data if isinstance(data, dict) else data
-    )  # earlier versions wrote no mark
+    # Earlier versions wrote no mark.
+    data = {"mark": None} | data if isinstance(data, dict) else data
     problem = data_problem(data)
     if problem:
         raise InputError(Problem(name, problem))

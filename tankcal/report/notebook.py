@@ -15,16 +15,10 @@ from tankcal.errors import CellError, TankcalError, VocabularyError
 from tankcal.text.shipped import shipped_folder
 
 TEMPLATES = ("certificate.ipynb", "working_papers.ipynb", "field_table.ipynb")
-FILES_IN_PARAMETERS = (
-    "RECORD",
-    "LETTERHEAD",
-)  # parameters that name files in the folder of the notebook
-BY_VALUES = (
-    LookupError,
-    TypeError,
-    ValueError,
-    AttributeError,
-)  # exceptions of a record with unexpected content
+# Parameters that name files in the folder of the notebook.
+FILES_IN_PARAMETERS = ("RECORD", "LETTERHEAD")
+# Exceptions of a record with unexpected content.
+BY_VALUES = (LookupError, TypeError, ValueError, AttributeError)
 _TEXTS = ("source", "text")  # keys whose texts a notebook file stores as lists of lines
 
 
@@ -212,20 +206,20 @@ def _language_info():
 
 def written(notebook):
     """Return the file content of a notebook in the format of `nbformat.writes`."""
-    cells = [_in_lines(cell) for cell in notebook["cells"]]
+    cells = [_split_cell(cell) for cell in notebook["cells"]]
     # Texts become lists of lines; the options are the options of nbformat.
     options = {"ensure_ascii": False, "indent": 1, "sort_keys": True, "separators": (",", ": ")}
     return json.dumps({**notebook, "cells": cells}, **options)
 
 
-def _in_lines(cell):
+def _split_cell(cell):
     cell_in_lines = {key: _lines(value) if key in _TEXTS else value for key, value in cell.items()}
     if "outputs" in cell:
-        cell_in_lines["outputs"] = [_output_in_lines(output) for output in cell["outputs"]]
+        cell_in_lines["outputs"] = [_split_output(output) for output in cell["outputs"]]
     return cell_in_lines
 
 
-def _output_in_lines(output):
+def _split_output(output):
     output_in_lines = {
         key: _lines(value) if key in _TEXTS else value for key, value in output.items()
     }

@@ -77,7 +77,7 @@ def pdf(blocks, folder=".", again=False, packed=None):
         file has changed.
     """
     shown = [block for block in blocks if block["kind"] not in WEB_ONLY]
-    blocks = [prepared(_with_formulas(block)) for block in shown]
+    blocks = [prepared(_add_formulas(block)) for block in shown]
     attached = attachments.contents(blocks, folder)
     files, blocks = _pictures_as_files(blocks)
     files["main.typ"] = (shipped_folder("report_templates") / "page.typ").read_bytes()
@@ -205,7 +205,7 @@ def _copy_fonts(folder):
             shutil.copyfile(path, Path(folder) / path.name)
 
 
-def _with_formulas(block):
+def _add_formulas(block):
     """Add the formula nodes of a table, {column: {text: nodes}}.
 
     The nodes are derived from the text, so that typst code of a notebook is never executed.

@@ -48,7 +48,7 @@ class PlainPaper:
         difference = numbers.unit("m3").least - numbers.unit(self.volume_unit).least
         return max(decimals - difference, 0)
 
-    def _in_unit(self, column):
+    def _convert_column(self, column):
         """Return a Column of volumes in the unit of the paper; other columns are unchanged."""
         unit = self._shown_unit(column.unit)
         if unit == column.unit:
@@ -197,7 +197,7 @@ class PlainPaper:
 
     def table(self, name, rows, columns, /, across=None, **values):
         """Table block with caption `captions.<name>`; `across` sets parts side by side."""
-        columns = [self._in_unit(column) for column in columns]
+        columns = [self._convert_column(column) for column in columns]
         texts = [self.column_texts(rows, column) for column in columns]
         heads = [
             [self.word(f"table_headings.{c.heading or c.key}"), self._unit_in_words(c.unit)]
@@ -229,15 +229,15 @@ class PlainPaper:
         ]
 
     def _texts(self, values, column):
-        known = self.words[column.words] if column.words else {}
-        return [self._text(value, known) for value in values]
+        translations = self.words[column.words] if column.words else {}
+        return [self._text(value, translations) for value in values]
 
-    def _text(self, value, known):
+    def _text(self, value, translations):
         if isinstance(value, list):
             return ", ".join(map(str, value))
-        if isinstance(value, bool) and str(value) not in known:
+        if isinstance(value, bool) and str(value) not in translations:
             return self.words["yes_no"]["yes" if value else "no"]
-        return known.get(str(value), str(value))
+        return translations.get(str(value), str(value))
 
     def _numbers(self, rows, column):
         factor = numbers.unit(column.unit).factor

@@ -12,10 +12,10 @@ def facts(paper):
         [
             ("radii_source", source_text(paper)),
             ("radii_temperature", paper.number(radii["temperature_c"], "degC", digits=3)),
-            ("radii_u_common", _of_type_b(paper, radii["u_common_m"])),
-            ("change_common", _of_type_b(paper, change.get("common_m"))),
-            ("change_own", _of_type_b(paper, change.get("own_m"))),
-            ("change_shared", _of_type_b(paper, change.get("shared_m") or None)),
+            ("radii_u_common", _type_b_text(paper, radii["u_common_m"])),
+            ("change_common", _type_b_text(paper, change.get("common_m"))),
+            ("change_own", _type_b_text(paper, change.get("own_m"))),
+            ("change_shared", _type_b_text(paper, change.get("shared_m") or None)),
         ]
     )
 
@@ -29,7 +29,7 @@ def courses(paper):
     return paper.show(RADII, on="radii_updated", limit=limit)
 
 
-def _of_type_b(paper, u_m):
+def _type_b_text(paper, u_m):
     if u_m is None:
         return None
     return paper.word("texts.of_type_b", u=paper.number(u_m, "mm", digits=2))

@@ -59,9 +59,9 @@ def write_job(job, directory, language=DEFAULT):
 
 def _translated(text, messages, words):
     """Translate the messages in the text of a file."""
-    for one in messages:
-        english, own = (json.dumps(part, ensure_ascii=False)[1:-1] for part in
-                        (str(one), say(words, one)))  # fmt: skip
+    for message in messages:
+        english, translation = (json.dumps(part, ensure_ascii=False)[1:-1] for part in
+                        (str(message), say(words, message)))  # fmt: skip
         pattern = rf"(?<![\w-]){re.escape(english)}(?![\w-])"
-        text = re.sub(pattern, lambda _, own=own: own, text)
+        text = re.sub(pattern, lambda _, translation=translation: translation, text)
     return text

@@ -157,11 +157,8 @@ def _folder(verification, folder, job, callbacks):
         text = message("verify_no_record", "is missing; expected the record of the results")
         raise InputError(Problem(RECORD, text))
     _listed(verification, folder, manifest)
-    proved = {
-        *verification.made_again,
-        RECORD,
-        TABLES,
-    }  # the record states the hash of its long tables
+    # The record states the hash of its long tables.
+    proved = {*verification.made_again, RECORD, TABLES}
     verification.by_hash = [name for name in files_below(folder) if name not in proved]
 
 
@@ -272,9 +269,8 @@ def _file(verification, path, job, callbacks):
             if content is not None:
                 (Path(folder) / name).write_bytes(content)
         record = records.load(Path(folder) / RECORD, is_checked=False)
-        table_problems = problems_of_tables(
-            record
-        )  # reads the tables while the temporary folder exists
+        # Reads the tables while the temporary folder exists.
+        table_problems = problems_of_tables(record)
     for name in WORKBOOKS:
         if name in embedded:
             compare_workbook(verification, f"{path.name}: {name}", embedded[name])

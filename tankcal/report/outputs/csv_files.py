@@ -29,7 +29,7 @@ def write_table(table, path, rows):
     if isinstance(rows, ArrayColumns):
         values_of = rows.arrays
     else:
-        values_of = rows if isinstance(rows, dict) else _by_keys(rows)
+        values_of = rows if isinstance(rows, dict) else _columns_of_rows(rows)
     columns = {}
     for column in table.in_csv():
         if column.key not in values_of:
@@ -39,7 +39,7 @@ def write_table(table, path, rows):
     write_csv(columns, path, table.csv_style)
 
 
-def _by_keys(rows):
+def _columns_of_rows(rows):
     keys = dict.fromkeys(key for row in rows for key in row)
     return {key: [row.get(key) for row in rows] for key in keys}
 

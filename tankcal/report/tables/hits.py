@@ -1,4 +1,4 @@
-"""Tables of reflectorless wall points: set-ups, common errors, rings, control, incidence."""
+"""Tables of wall hits: set-ups, common errors, rings, control targets, incidence."""
 
 from tankcal.report.tables.sights import (
     CHECKS,

@@ -123,7 +123,7 @@ DIPS = Table(
 # ---- quantities of several units, converted to their printed units
 
 
-def _in_small_units(rows, keys):
+def _convert_units(rows, keys):
     """Return the rows with the values of `keys` in printed units, and the key "shown_unit"."""
     converted = []
     for row in rows:
@@ -135,7 +135,7 @@ def _in_small_units(rows, keys):
 
 def _sizes(record):
     rows = record["liquid"]["sizes"]
-    return _in_small_units(rows, ("change", "u_before", "u_after"))
+    return _convert_units(rows, ("change", "u_before", "u_after"))
 
 
 _UNIT = _named("shown_unit", "unit", width=8)
@@ -159,7 +159,7 @@ def _causes(record):
         cause if cause["detectable"] is not None else cause | dict.fromkeys(("size", "sd"))
         for cause in record["liquid"]["causes"]
     ]
-    return _in_small_units(rows, ("size", "sd", "detectable"))
+    return _convert_units(rows, ("size", "sd", "detectable"))
 
 
 def _cause(paper, row):

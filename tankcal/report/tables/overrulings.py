@@ -67,9 +67,9 @@ def sentence_of(paper, row):
     """Return a sentence on a decision: reason, person, result of the test, and effect."""
     parts = [paper.word(f"overrulings.{row['decision']}", what=_what(paper, row))]
     parts.append(paper.word("overrulings.reason", reason=row["reason"].rstrip(". ")))
-    by, day = row["by"], paper.day(row["date"])
-    if by:
-        who = ", ".join(part for part in (by, day) if part)
+    person, day = row["by"], paper.day(row["date"])
+    if person:
+        who = ", ".join(part for part in (person, day) if part)
         parts.append(paper.word("overrulings.by", who=who))
     elif day:
         parts.append(paper.word("overrulings.on", day=day))

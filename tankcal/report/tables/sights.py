@@ -1,4 +1,4 @@
-"""Columns common to the tables of reflectorless wall points and of tangents."""
+"""Columns common to the tables of wall hits and of tangents."""
 
 from tankcal.report.tables.table import Column
 

@@ -64,7 +64,7 @@ def point_columns(record, points=None):
     if len(adjusted):
         columns |= _adjusted(points["point"], as_columns(adjusted))
     if record["capacity"] is not None:
-        columns |= _about_wall(points, record["rejected"])
+        columns |= _wall_columns(points, record["rejected"])
     return ArrayColumns(columns)
 
 
@@ -100,7 +100,7 @@ def _adjusted(names, adjusted):
     }
 
 
-def _about_wall(points, rejected):
+def _wall_columns(points, rejected):
     """Return position and residual at the wall, or the reason of rejection, for points."""
     rejected = {row["point"]: row for row in rejected}
     rejections = [rejected.get(name, {}) for name in points["point"]]

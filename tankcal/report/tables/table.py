@@ -124,16 +124,16 @@ class Table:
         shown = [
             column for column in self.columns if column.on is None or name in column.on.split()
         ]
-        return self._in_order(name, _known(shown, rows))
+        return self._order_columns(name, _known(shown, rows))
 
     def in_workbook(self, rows=None):
         """Return the columns of the sheet in the workbook."""
         shown = [replace(column, **column.in_sheet) for column in self.columns if column.sheet]
-        return self._in_order("sheet", _known(shown, rows))
+        return self._order_columns("sheet", _known(shown, rows))
 
     def in_csv(self):
         """Return the columns of the CSV file."""
-        return self._in_order("csv", [column for column in self.columns if column.csv])
+        return self._order_columns("csv", [column for column in self.columns if column.csv])
 
     def but(self, **changed):
         """Return the table with changed fields of some columns, {key: {field: value}}."""
@@ -144,7 +144,7 @@ class Table:
         """Return the table with the columns of some keys only."""
         return replace(self, columns=tuple(column for column in self.columns if column.key in keys))
 
-    def _in_order(self, medium, columns):
+    def _order_columns(self, medium, columns):
         later = self.last.get(medium, "").split()
         return sorted(
             columns, key=lambda column: later.index(column.key) if column.key in later else -1

@@ -141,7 +141,7 @@ def inputs(paper):
     for line in lines:
         group = _group(line)
         shown_line = line | {"is_default": False} if group == "default" else line
-        groups[group].append(_with_u(paper, shown_line))
+        groups[group].append(_format_input(paper, shown_line))
     facts = [(f"inputs_{name}", "; ".join(texts)) for name, texts in groups.items()]
     missing = [choice for choice in paper.record["choices"] if choice["code"] == "not_in_budget"]
     names = [
@@ -163,19 +163,19 @@ def _group(line):
     return "survey" if line["input"] in FROM_SURVEY else "declared"
 
 
-def _with_u(paper, line):
+def _format_input(paper, line):
     name = paper.input_name(line)
     if line["u"] is None or line["input"] in FROM_SURVEY:
         return name
     return paper.word(
         "texts.input_u",
         input=name,
-        u=_with_unit(paper, line["u"], line["unit"]),
+        u=_format_u(paper, line["u"], line["unit"]),
         distribution=paper.words["distributions"].get(line["distribution"], line["distribution"]),
     )
 
 
-def _with_unit(paper, u, unit):
+def _format_u(paper, u, unit):
     """Format an uncertainty with two digits and its unit; volumes have the unit of the paper."""
     if unit == "m3":
         return paper.number(u, unit, digits=2)

@@ -32,10 +32,10 @@ def sentences(paper):
     verdict = paper.record["rule"]
     texts = [_limit_sentence(paper, result) for result in verdict["uncertainty"]]
     texts += [_deviation_sentence(paper, result) for result in verdict["deviation"]]
-    return [*texts, *_by_law(paper)]
+    return [*texts, *_propagation_note(paper)]
 
 
-def _by_law(paper):
+def _propagation_note(paper):
     """Return a sentence on the evaluation of limits for deliveries if Monte Carlo is used."""
     limits = paper.record["rule"]["uncertainty"]
     is_bound = any(limit["of"] == "deliveries" for limit in limits)
@@ -210,7 +210,7 @@ def deviation_limit_text(paper, result):
     return paper.word("texts.rule_deviation_limit", of=quantity, limit=limit)
 
 
-def _in_words(name, **more):
+def _text_column(name, **more):
     """Return a column with a text of `deviation_texts`."""
     return Column(name, text=lambda paper, result: deviation_texts(paper, result)[name],
                   heading=f"deviation_{name}", **more)  # fmt: skip
@@ -236,18 +236,18 @@ DEVIATIONS = Table(
             width=16,
         ),
         Column("low_m", "m", height=True, on="", sheet="down_to_m"),
-        _in_words("volume", align="right"),
-        _in_words("stated", align="right"),
-        _in_words("deviation", align="right"),
+        _text_column("volume", align="right"),
+        _text_column("stated", align="right"),
+        _text_column("deviation", align="right"),
         Column("stated_m3", "m3", on="", sheet="stated_m3", **_LITRES_OF_U),
         Column("volume_m3", "m3", on="", sheet="table_m3", **_LITRES_OF_U),
         Column("deviation_m3", "m3", on="", sheet="deviation_m3", **_LITRES_OF_U),
-        _in_words("U", align="right"),
+        _text_column("U", align="right"),
         Column("U_m3", "m3", u="U_m3", on="", sheet="U_m3"),
-        _in_words("limit"),
-        _in_words("guard", sheet="guard"),
-        _in_words("verdict"),
-        _in_words("probability", align="right"),
+        _text_column("limit"),
+        _text_column("guard", sheet="guard"),
+        _text_column("verdict"),
+        _text_column("probability", align="right"),
         Column(
             "conformity",
             "share",
@@ -294,7 +294,7 @@ def clauses(paper):
         )
         for text, result in texts
     ]
-    sentences = [*dict.fromkeys(sentences), *_by_law(paper)]
+    sentences = [*dict.fromkeys(sentences), *_propagation_note(paper)]
     return [blocks.listing(sentences)] if sentences else []
 
 

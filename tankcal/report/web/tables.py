@@ -85,7 +85,7 @@ def _rows(block):
             column,
             align,
             block["decimal_mark"],
-            _with_formulas if i in formulas else escape,
+            _typeset_formulas if i in formulas else escape,
             links=links.get(i),
             look=f"{align} whole" if i in unbroken_columns else align,
         )
@@ -111,7 +111,7 @@ def _cells(texts, align, mark, shown, *, links, look):
     ]
 
 
-def _with_formulas(text):
+def _typeset_formulas(text):
     return "".join(
         f'<math display="inline">{node["mathml"]}</math>'
         if node["t"] == "math"

@@ -102,9 +102,8 @@ class Book(Writer):
             "strings_to_formulas": False,
             "strings_to_urls": False,
             "strings_to_numbers": False,
-            "tmpdir": str(
-                Path(path).parent
-            ),  # sheets are stored in files, since memory would hold them three times
+            # Sheets are stored in files, since memory would hold them three times.
+            "tmpdir": str(Path(path).parent),
             "default_format_properties": dict(FONT),
         }
         super().__init__(xlsxwriter.Workbook(str(path), options), words)

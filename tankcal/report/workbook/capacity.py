@@ -8,6 +8,7 @@ from tankcal.report.workbook.tables import columns_of
 from tankcal.text.digits import decimals_of_height, shortest
 from tankcal.text.words import marks_of
 
+# Key of a column and end of its name in formulas.
 NAMED = {
     "height_m": "height",
     "volume_m3": "volume",
@@ -18,7 +19,7 @@ NAMED = {
     "low_m3": "low",
     "high_m3": "high",
     "interval": "interval",
-}  # key of a column and end of its name in formulas
+}
 _HEAD_ROW = 3
 
 

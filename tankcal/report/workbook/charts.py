@@ -29,9 +29,9 @@ def charts_sheets(book, record, rows):
         row = _insert(book, sheet, row, (chart, title, x_axis, "residual"), _LOW)
 
 
-def _insert(book, sheet, row, drawn, high):
+def _insert(book, sheet, row, chart_parts, high):
     """Insert a chart into one row, which page breaks cannot divide; return the next row."""
-    chart, title, *axes = drawn
+    chart, title, *axes = chart_parts
     x, y = (book.words["axes"][axis] for axis in axes)
     sheet.set_row(row, _PT * (high + 5))
     chart.set_size({"width": _WIDE, "height": high})

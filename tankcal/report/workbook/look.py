@@ -13,10 +13,8 @@ ACCENT = "#1F4E79"
 RULE = "#BFC9D4"
 MUTED = "#595959"
 INPUT = "#FFF7DB"
-FONT = {
-    "font_name": "Arial",
-    "font_size": 10,
-}  # metric-compatible substitutes exist on every system
+# Metric-compatible substitutes exist on every system.
+FONT = {"font_name": "Arial", "font_size": 10}
 DATE = 14  # Excel's built-in short date in the format of the reader's system
 LINE_PT = 15.0  # height of a line of text, points
 ROW_PT = 15.75  # height of a row with a single line, points; the default of 13.5 clips digits

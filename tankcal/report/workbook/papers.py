@@ -73,7 +73,7 @@ def lines_sheet(book, record):
 
 
 def hits_sheet(book, record):
-    """Write set-ups, common errors, rings, control and incidence of reflectorless wall points."""
+    """Write set-ups, common errors, rings, control targets and incidence of wall hits."""
     sheet = book.sheet("hits", book.word("texts.hits_subtitle"), landscape=True)
     chosen = [
         table

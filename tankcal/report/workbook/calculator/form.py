@@ -171,13 +171,13 @@ class _Writer:
             self._sheet.write_number(row, VALUES, line.result, look)
         book.put(self._sheet, row, 2, line.unit, indent=1)
         if line.by:
-            self._digits_by_u(row, line.by, range(digits + 1, self._table.finest + 1))
+            self._add_decimals(row, line.by, range(digits + 1, self._table.finest + 1))
 
-    def _digits_by_u(self, row, by, finer):
-        """Add conditional formats with more decimals for smaller values of the U `by`."""
+    def _add_decimals(self, row, U_key, finer):
+        """Add conditional formats with more decimals for smaller values of the U of a line."""
         for digits in reversed(finer):
             bound = f"{bound_of_decimals(digits):.10g}"
-            cell = f"$B${self._places.row(by) + 1}"
+            cell = f"$B${self._places.row(U_key) + 1}"
             self._sheet.conditional_format(
                 row,
                 VALUES,

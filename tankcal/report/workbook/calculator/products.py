@@ -62,9 +62,8 @@ PRODUCTS = (
     ),
     Product("crude_54a", 610.5, (Zone(1075.0, 613.9723),)),
 )
-OWN_FACTOR = (
-    len(PRODUCTS) + 1
-)  # number of the last entry in the list of products: factor of the user
+# Number of the last entry in the list of products: factor of the user.
+OWN_FACTOR = len(PRODUCTS) + 1
 CODES = (*(product.code for product in PRODUCTS), "own_factor")
 BASE_C = 15.0
 LEAST_C, MOST_C = -40.0, 90.0  # limits of the temperature of the liquid

@@ -42,10 +42,8 @@ class Table:
         self.reference_m = self.job["datum"]["reference_height_m"]
         self.has_interval = "interval" in self.capacity
         further = [entry["density_kg_m3"] for entry in record["densities"]]
-        self.densities = [
-            self.job["table"]["liquid_density_kg_m3"],
-            *further,
-        ]  # kg/m3; the density of the table is the first
+        # kg/m3; the density of the table is the first.
+        self.densities = [self.job["table"]["liquid_density_kg_m3"], *further]
 
     @property
     def rises(self):
