@@ -88,7 +88,21 @@ def document(**properties):
 
 
 def masthead(title, subtitle="", laboratory="", number_label="", number=None):
-    """Head of the first page; a labelled number that is None becomes a blank line to fill in."""
+    """Head of the first page; a labelled number that is None becomes a blank line to fill in.
+
+    Parameters
+    ----------
+    title, subtitle, laboratory : str
+        Texts of the head.
+    number_label : str, optional
+        Label of the number; "": no number.
+    number : str, optional
+        Number of the document.
+
+    Returns
+    -------
+    Block
+    """
     return Block(
         {
             "kind": "masthead",
@@ -134,7 +148,21 @@ def notice(text):
 
 
 def result(label, text, note=""):
-    """Framed main result with its label above and a note below."""
+    """Framed main result with its label above and a note below.
+
+    Parameters
+    ----------
+    label : str
+        Label of the result.
+    text : str
+        The result.
+    note : str, optional
+        Text below the result.
+
+    Returns
+    -------
+    Block
+    """
     return Block(
         {"kind": "result", "label": _text(label), "text": _text(text), "note": _text(note)}
     )
@@ -256,7 +284,19 @@ def form(columns, rows):
 
 
 def columns_table(columns, rows=None, caption="", align=None, across=4, decimal_mark="."):
-    """Long narrow table, set `across` times side by side on each page; see `table`."""
+    """Long narrow table, with several parts side by side on each page.
+
+    Parameters
+    ----------
+    columns, rows, caption, align, decimal_mark
+        As in `table`.
+    across : int, optional
+        Number of parts side by side; each part has the headings.
+
+    Returns
+    -------
+    Block
+    """
     across = int(across)
     return _table("columns_table", columns, rows, caption, align, decimal_mark, across=across)
 
@@ -311,6 +351,7 @@ def without_controls(text):
 
 
 def _table(kind, columns, rows, caption, align, decimal_mark, **more):
+    """Return the Block of a table after checks of its dimensions."""
     if rows is None:  # `columns` is a DataFrame
         columns, rows, align = _read_data_frame(columns, align)
     heads = [[_text(column), ""] if isinstance(column, str) else list(column) for column in columns]

@@ -69,7 +69,17 @@ def write_field_sheets(path, survey, language, kind="vertical"):
 
 
 def sheets(survey, language, kind="vertical"):
-    """Return the blocks of the field sheets (list of Block); see `write_field_sheets`."""
+    """Return the blocks of the field sheets.
+
+    Parameters
+    ----------
+    survey, language, kind
+        As in `write_field_sheets`.
+
+    Returns
+    -------
+    list of Block
+    """
     texts = texts_in(language)
     paper = PlainPaper(texts.words)
     title = paper.word("forms.title")

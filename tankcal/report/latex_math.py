@@ -95,12 +95,15 @@ class _Reader:
         self.at = 0
 
     def refuse(self, what):
+        """Raise TankcalError that names the formula."""
         raise TankcalError(f"formula {self.latex.strip()!r}: {what}")
 
     def peek(self):
+        """Return the next token without consuming it, or None at the end."""
         return self.tokens[self.at][0] if self.at < len(self.tokens) else None
 
     def sequence(self, until):
+        """Convert symbols up to the token `until`; None: up to the end."""
         parts = []
         while self.peek() != until:
             if self.peek() is None:
@@ -109,6 +112,7 @@ class _Reader:
         return " ".join(typst for typst, _ in parts), "".join(mathml for _, mathml in parts)
 
     def scripted(self):
+        """Convert a symbol with its subscript and superscript."""
         base = self.atom()
         scripts = {}
         while self.peek() in ("^", "_"):
@@ -125,6 +129,7 @@ class _Reader:
         return typst, f"<{tag}><mrow>{base[1]}</mrow>{inner}</{tag}>"
 
     def atom(self):
+        """Convert a number, letter, operator, group or macro."""
         if self.peek() is None:
             self.refuse("something is missing at the end")
         macro, number, character, _ = self.tokens[self.at].groups()
@@ -146,6 +151,7 @@ class _Reader:
         return self.refuse(f"the character {character!r} is not supported")
 
     def macro(self, name):
+        """Convert a macro with its arguments."""
         if name in _GREEK:
             return name, f"<mi>{_GREEK[name]}</mi>"
         if name in _SYMBOLS:
@@ -173,6 +179,7 @@ class _Reader:
         return self.refuse(f"the macro \\{name} is not supported")
 
     def braced(self):
+        """Convert a group in braces."""
         if self.peek() != "{":
             self.refuse("'{' expected")
         return self.atom()

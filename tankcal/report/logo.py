@@ -5,11 +5,11 @@ import re
 import struct
 from xml.etree import ElementTree
 
-MAX_LOGO_BYTES = 500_000
+MAX_LOGO_BYTES = 500_000  # largest size of the file
 MAX_LOGO_PIXELS = 4000  # pixels along a side
 MAX_DRAWN = 100_000  # elements of an SVG after the expansion of its references
 _SVG = "{http://www.w3.org/2000/svg}"
-_PNG = b"\x89PNG\r\n\x1a\n"
+_PNG = b"\x89PNG\r\n\x1a\n"  # first bytes of a PNG file
 _ACTIVE = {  # SVG elements with programs, animation or foreign content
     "script", "foreignObject", "set", "animate", "animateMotion", "animateTransform", "handler",
     "iframe", "embed", "object", "audio", "video", "discard",
@@ -83,6 +83,7 @@ def _expansion_problem(root):
 
     def size(element):
         # An element that is still being counted refers to itself.
+        """Return the number of drawn elements, limited to MAX_DRAWN + 1."""
         if element in open_:
             return MAX_DRAWN + 1
         if element not in sizes:

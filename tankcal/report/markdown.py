@@ -5,7 +5,7 @@ import mistune
 from tankcal.errors import TankcalError
 from tankcal.report.latex_math import formula
 
-_SCHEMES = ("https:", "http:", "mailto:")
+_SCHEMES = ("https:", "http:", "mailto:")  # schemes of links that remain links
 _WRAPPERS = {
     "paragraph": "paragraph",
     "block_text": "plain",
@@ -32,6 +32,7 @@ def _children(tokens):
 
 
 def _node(token):
+    """Convert a token of mistune into a node."""
     kind, raw = token["type"], token.get("raw", "")
     if kind in _WRAPPERS:
         return {"t": _WRAPPERS[kind], "c": _children(token["children"])}

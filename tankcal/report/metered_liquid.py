@@ -24,7 +24,23 @@ def density_text(paper, liquid):
 
 
 def with_u(paper, liquid, key, unit):
-    """Return a value with its standard uncertainty, such as "998.20(20) kg/m³"."""
+    """Return a value with its standard uncertainty, such as "998.20(20) kg/m³".
+
+    Parameters
+    ----------
+    paper : Paper
+        Formatter.
+    liquid : dict
+        Part "liquid" of the record.
+    key : str
+        Key of the value; u_KEY is its standard uncertainty.
+    unit : str
+        Unit, a key of numbers.UNITS.
+
+    Returns
+    -------
+    str
+    """
     concise = numbers.concise(liquid[key], liquid[f"u_{key}"], paper.marks)
     return f"{concise}\N{NO-BREAK SPACE}{numbers.unit(unit).symbol}"
 

@@ -114,7 +114,19 @@ def symbol(text):
 
 
 def like_its_sd(value, sd, marks=ENGLISH):
-    """Round a value to two digits of its standard deviation, or to four digits without it."""
+    """Round a value to two digits of its standard deviation, or to four digits without it.
+
+    Parameters
+    ----------
+    value, sd : float
+        Value and standard deviation in equal units; sd 0 or None: without.
+    marks : Marks, optional
+        Decimal mark and separators of the language.
+
+    Returns
+    -------
+    str
+    """
     if not sd:
         return format_significant(value, 4, marks)
     rounded = format_with_u(value, sd, marks, least=0, written_out=WITHOUT_U)
@@ -125,6 +137,17 @@ def concise(value, sd, marks=ENGLISH):
     """Format a value with two digits of its standard deviation in brackets: "4.3816(13)".
 
     Without a standard deviation the value has seven digits and no brackets.
+
+    Parameters
+    ----------
+    value, sd : float
+        Value and standard deviation in equal units; sd 0 or None: without.
+    marks : Marks, optional
+        Decimal mark and separators of the language.
+
+    Returns
+    -------
+    str
     """
     if not sd:
         return format_significant(value, 7, marks)

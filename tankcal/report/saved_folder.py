@@ -12,7 +12,21 @@ from tankcal.text.decoding import read_json
 
 
 def write_pages(pages, paper, folder, file, page_file=None):
-    """Write pages(paper, folder) as a PDF and pages(paper, whole=True) as a web page."""
+    """Write pages(paper, folder) as a PDF and pages(paper, whole=True) as a web page.
+
+    Parameters
+    ----------
+    pages : callable
+        pages(paper, folder) and pages(paper, whole=True) return lists of Block.
+    paper : SavedPaper
+        Formatter of the saved file.
+    folder : Path
+        Folder of the files.
+    file : str
+        Name of the PDF.
+    page_file : str, optional
+        Name of the web page; None: no web page.
+    """
     from tankcal.report.pdf import pdf
     from tankcal.report.web import page
 
@@ -68,6 +82,21 @@ class SavedFolder:
         """Write the files by fill(folder, progress), all or none; return their paths.
 
         An earlier folder of this kind is replaced. A folder with other files raises InputError.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Folder of the results.
+        fill : callable
+            fill(folder, progress) writes the files.
+        language : str, optional
+            Language requested for the papers; None: no request.
+        progress : callable, optional
+            Called as progress(text).
+
+        Returns
+        -------
+        list of Path
         """
         self.refuse_foreign(folder)
         with folders.replaced(folder, language) as temporary:

@@ -50,6 +50,7 @@ def _beyond_pipe(paper):
 
 
 def _matrix(paper, list_deg, cells):
+    """Return the table of a list: a row per sounding, a column per trim, and the largest U."""
     soundings = paper.record["ship"]["sounding_m"]
     indices = range(len(soundings))
     heads = [[paper.word("table_headings.ship_sounding_m"), "m"]]

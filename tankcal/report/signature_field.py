@@ -11,8 +11,8 @@ import re
 
 from tankcal.report.pdf_objects import head_of, objects_of
 
-LINK = b"/URI(tankcal:signature)"
-NAME = "signature"
+LINK = b"/URI(tankcal:signature)"  # link of page.typ at the place of the signature
+NAME = "signature"  # name of the field in the PDF
 _PRINTED = 4  # annotation flag: print
 
 

@@ -63,6 +63,7 @@ def _key_values(block):
 
 
 def _table(block):
+    """Return the lines of a table with aligned columns."""
     heads = [column["heading"] for column in block["columns"]]
     units = [column["unit"] for column in block["columns"]]
     columns = [

@@ -319,6 +319,21 @@ def saved_folder(verification, folder, callbacks, manifest):
 
     The papers of comparisons, inspections and histories are written again from their file. For
     plans, camera results and any other folder with SHA256SUMS, only the hashes are compared.
+
+    Parameters
+    ----------
+    verification : Verification
+        Receives the discrepancies.
+    folder : path
+        Folder to verify.
+    callbacks : tuple or None
+        Progress (step, part); None: compare hashes only.
+    manifest : Manifest or None
+        Content of SHA256SUMS.
+
+    Returns
+    -------
+    bool
     """
     from tankcal.record.camera_versions import CAMERA
     from tankcal.record.plan import PLAN

@@ -114,7 +114,17 @@ def _same_record(verification, name, text):
 
 
 def compare_workbook(verification, name, content):
-    """Compare the hash of the record in the properties of an Excel workbook."""
+    """Compare the hash of the record in the properties of an Excel workbook.
+
+    Parameters
+    ----------
+    verification : Verification
+        Receives the discrepancies.
+    name : str
+        Name of the file.
+    content : bytes
+        Content of the file.
+    """
     verification.compared.append(name)
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as parts:
@@ -127,7 +137,19 @@ def compare_workbook(verification, name, content):
 
 
 def compare_certificate(verification, name, content, record):
-    """Compare a digital certificate with the record: hash, input files and content."""
+    """Compare a digital certificate with the record: hash, input files and content.
+
+    Parameters
+    ----------
+    verification : Verification
+        Receives the discrepancies.
+    name : str
+        Name of the file.
+    content : bytes
+        Content of the file.
+    record : dict
+        Record of the results.
+    """
     verification.compared.append(name)
     try:
         root = ElementTree.fromstring(content)
@@ -188,7 +210,17 @@ def _compare_again(verification, name, content, record, root):
 
 
 def compare_page(verification, name, content):
-    """Compare the hash in a web page or notebook; pages without certificate have no hash."""
+    """Compare the hash in a web page or notebook; pages without certificate have no hash.
+
+    Parameters
+    ----------
+    verification : Verification
+        Receives the discrepancies.
+    name : str
+        Name of the file.
+    content : bytes
+        Content of the file.
+    """
     text = content.decode("utf-8", errors="replace")
     if _HASH.search(text):
         verification.compared.append(name)
@@ -196,7 +228,17 @@ def compare_page(verification, name, content):
 
 
 def compare_tables(verification, folder, record):
-    """Compare the CSV files, which contain no hash, with the tables of the record."""
+    """Compare the CSV files, which contain no hash, with the tables of the record.
+
+    Parameters
+    ----------
+    verification : Verification
+        Receives the discrepancies.
+    folder : Path
+        Folder of the CSV files.
+    record : dict
+        Record of the results.
+    """
     if record["tankcal"] != tankcal.__version__:
         return  # another version may write another format
     present = [name for name in tables.FILES if name.endswith(".csv") and (folder / name).is_file()]
@@ -222,7 +264,17 @@ def compare_tables(verification, folder, record):
 
 
 def compare_inputs(verification, record, job):
-    """Compare the input files, if available, with the hashes in the record."""
+    """Compare the input files, if available, with the hashes in the record.
+
+    Parameters
+    ----------
+    verification : Verification
+        Receives the discrepancies.
+    record : dict
+        Record of the results.
+    job : Path
+        Folder of the input files.
+    """
     places = {entry["file"]: job / entry["file"] for entry in record["files"]}
     present = {file: place for file, place in places.items() if place.is_file()}
     verification.inputs_found = bool(present)

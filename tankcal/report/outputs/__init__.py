@@ -75,7 +75,22 @@ def write(
 
 
 def write_adjustment(job, adjustment, directory, progress=None, letterhead=None, papers=True):
-    """Write all files of an adjusted survey without tank (`survey.Adjustment` of a `Job`)."""
+    """Write all files of an adjusted survey without tank.
+
+    Parameters
+    ----------
+    job : Job
+        Job of the survey.
+    adjustment : survey.Adjustment
+        Result of the adjustment.
+    directory, progress, letterhead, papers
+        As in `write`.
+
+    Returns
+    -------
+    list of Path
+        Written files.
+    """
 
     def prepare(folder):
         record = records.record_of_adjustment(job, adjustment)

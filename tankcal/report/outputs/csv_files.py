@@ -86,7 +86,17 @@ def _plain_cell(value):
 
 
 def write_csv(columns, path, style):
-    """Write columns {heading: cells}; `style` is the format of floats, such as "%.6f"."""
+    """Write columns as a CSV file.
+
+    Parameters
+    ----------
+    columns : dict
+        {heading: cells}, all of equal length.
+    path : Path
+        Path of the file.
+    style : str
+        Format of floats, such as "%.6f".
+    """
     columns = {heading: _cells(values) for heading, values in columns.items()}
     count = len(next(iter(columns.values()), ()))
     with open(path, "w", encoding="utf-8", newline="") as file:

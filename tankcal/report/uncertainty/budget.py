@@ -146,6 +146,7 @@ def others(paper):
 
 
 def _matrix(paper, budgets):
+    """Return a table: a row per input, a column per volume or delivery."""
     names = [paper.input_name(line) for line in budgets[0]["lines"]]
     columns = [_contributions(paper, budget, names) for budget in budgets]
     totals = [paper.word(f"table_headings.{key}_of_all") for key in ("u", "k", "U")]
@@ -157,6 +158,7 @@ def _matrix(paper, budgets):
 
 
 def _contributions(paper, budget, names):
+    """Return the column of a volume or delivery: contributions, u, k and U as texts."""
     factor = paper.volume_factor
     digits = decimals_of(factor * budget["u_m3"])
     known = {paper.input_name(line): factor * line["contribution_m3"] for line in budget["lines"]}

@@ -49,7 +49,23 @@ def density_blocks(paper):
 
 
 def times_across(paper, rows, columns, most=MOST_ACROSS):
-    """Return how often the columns fit side by side on a page, at most `most`."""
+    """Return how often the columns fit side by side on a page, at most `most`.
+
+    Parameters
+    ----------
+    paper : Paper
+        Formatter.
+    rows : list of dict
+        Rows of the table.
+    columns : list of Column
+        Columns of the table.
+    most : int, optional
+        Largest result.
+
+    Returns
+    -------
+    int
+    """
     longest = [max(map(len, paper.column_texts(rows, column))) for column in columns]
     return max(1, min(most, LETTERS_OF_A_LINE // sum(1 + length for length in longest)))
 

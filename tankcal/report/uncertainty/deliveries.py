@@ -5,6 +5,7 @@ from tankcal.report.uncertainty.budget import UNLIMITED
 from tankcal.report.uncertainty.stated import same
 from tankcal.text.digits import LITRE_DECIMALS
 
+# Keys of the worst deliveries in the record.
 WORST = ("absolute", "relative", "at_minimum")
 
 

@@ -6,7 +6,7 @@ larger distance of its ends from the volume (docs/uncertainty.md).
 
 from tankcal.text.digits import decimals_of
 
-MONTE_CARLO = "monte_carlo"
+MONTE_CARLO = "monte_carlo"  # code of a Monte Carlo interval in the record
 MARK = "*"  # mark of rows with a Monte Carlo interval
 _SAME_M = 1e-9  # tolerance for equal dips
 

@@ -16,6 +16,7 @@ def with_ids(blocks, words):
     contents = []
 
     def named(item, depth, text):
+        """Add a heading to the contents and return it with its id."""
         name = f"s{len(contents) + 1}"
         contents.append((depth, text, name))
         return item | {"id": name}

@@ -126,6 +126,7 @@ _SPANS = {"paragraph": "p", "quote": "blockquote", "emph": "em", "strong": "stro
 
 
 def _node(node):
+    """Return a markdown node as HTML."""
     kind = node["t"]
     inner = "".join(_node(child) for child in node.get("c", []))
     if kind in _SPANS:

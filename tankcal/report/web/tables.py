@@ -26,7 +26,21 @@ def searchable_table(block, number, words):
     """Return a long narrow table with a search field.
 
     The table is divided into parts of PIECE rows, whose layout the browser computes when they
-    become visible. `number` is the number of the table on the page.
+    become visible.
+
+    Parameters
+    ----------
+    block : dict
+        Block of the table.
+    number : int
+        Number of the table on the page.
+    words : dict
+        Words of the web page.
+
+    Returns
+    -------
+    str
+        HTML.
     """
     rows = [row.replace('<td class="decimal">', "<td>") for row in _rows(block)]
     pieces = "".join(

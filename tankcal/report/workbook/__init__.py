@@ -96,6 +96,7 @@ def write(record, path, language=None, digest=None):
 
 
 def _sheets_of_tank(book, record):
+    """Write the sheets of a calibrated tank, in the order of the workbook."""
     certificate_sheet(book, record)
     rows = capacity_sheet(book, record)
     proportional_parts_sheet(book, record)

@@ -203,8 +203,18 @@ class Book(Writer):
     def plain_sheet(self, code, columns, landscape=False, tab="origin"):
         """Add a protected sheet of columns with headings in row 1, for other programs.
 
-        A cell with None remains blank. See `sheet` for the parameters; `columns` is a list of
-        Column.
+        A cell with None remains blank.
+
+        Parameters
+        ----------
+        columns : list of Column
+            Columns of the sheet.
+        code, landscape, tab
+            As in `sheet`.
+
+        Returns
+        -------
+        Sheet
         """
         sheet = self._page(code, landscape, tab)
         self.widths(sheet, *(column.width for column in columns))
@@ -281,7 +291,19 @@ class Book(Writer):
         sheet.set_h_pagebreaks(breaks)
 
     def name(self, name, sheet, first_row, last_row, column, last_column=None):
-        """Define a name for the cells of columns; names do not depend on the language."""
+        """Define a name for the cells of columns; names do not depend on the language.
+
+        Parameters
+        ----------
+        name : str
+            Name to define.
+        sheet : Sheet
+            Sheet of the cells.
+        first_row, last_row, column : int
+            Position of the cells, from 0.
+        last_column : int, optional
+            Last column; None: a single column.
+        """
         cells = xl_range_abs(first_row, column, last_row, last_column or column)
         self._file.define_name(name, f"={quote_sheetname(sheet.get_name())}!{cells}")
 

@@ -20,7 +20,7 @@ NAMED = {
     "high_m3": "high",
     "interval": "interval",
 }
-_HEAD_ROW = 3
+_HEAD_ROW = 3  # row of the first headings, from 0
 
 
 @dataclass(frozen=True)

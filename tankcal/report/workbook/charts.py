@@ -7,7 +7,7 @@ from tankcal.report.tables.tank import DEVIATIONS
 from tankcal.report.workbook.look import ACCENT
 from tankcal.report.workbook.tables import columns_of, set_widths
 
-_HEAD_ROW = 3
+_HEAD_ROW = 3  # row of the first headings, from 0
 _MOST_POINTS = 20_000  # largest number of points in the sheet Deviations
 _WIDE, _HIGH, _LOW = 640, 415, 300  # pixels; width, heights of two or three charts per page
 _PT = 0.75  # points per pixel
@@ -16,7 +16,17 @@ _GRID = {"visible": True, "line": {"color": "#E3E8ED", "width": 0.75}}
 
 
 def charts_sheets(book, record, rows):
-    """Write charts of the capacity table (its `Rows`) and of the deviations of the wall."""
+    """Write charts of the capacity table (its `Rows`) and of the deviations of the wall.
+
+    Parameters
+    ----------
+    book : Book
+        Workbook.
+    record : dict
+        Record of the tank.
+    rows : capacity.Rows
+        Position of the capacity table.
+    """
     sheet = book.sheet("charts", tab="paper")
     row = _HEAD_ROW
     for name, axis in (("litres_per_cm", "litres_per_cm"), ("U", "U_m3")):

@@ -124,7 +124,21 @@ def lines_in(column, width):
 
 
 def lines_of(text, width, bold=False):
-    """Return the number of lines of a text, wrapped between words, for a width in digits."""
+    """Return the number of lines of a text, wrapped between words, for a width in digits.
+
+    Parameters
+    ----------
+    text : str
+        Text, possibly with line breaks.
+    width : float
+        Width of the columns, in digits.
+    bold : bool, optional
+        True: the letters are bold.
+
+    Returns
+    -------
+    int
+    """
     width_px = (_UNIT_PX * width - _EMPTY_PX) / (_BOLD if bold else 1.0)
     return min(sum(_count_lines(part, width_px) for part in str(text).split("\n")), _MOST_LINES)
 

@@ -16,7 +16,7 @@ from tankcal.report.workbook.look import Column, number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
 
-_HEAD_ROW = 3
+_HEAD_ROW = 3  # row of the first headings, from 0
 
 
 def courses_sheet(book, record):

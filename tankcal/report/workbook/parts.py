@@ -14,7 +14,7 @@ from tankcal.report.workbook.tables import columns_of, set_widths
 from tankcal.text.digits import LITRE_DECIMALS, decimals_of_rows, format_significant, shortest
 from tankcal.text.words import marks_of
 
-_HEAD_ROW = 3
+_HEAD_ROW = 3  # row of the first headings, from 0
 _SAME_MM = 1e-6  # tolerance, mm, for a row at a whole millimetre
 _WIDTHS = (50, 16, 16, 16, 16)  # widths of the columns, letters
 

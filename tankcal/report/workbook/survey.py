@@ -29,7 +29,7 @@ from tankcal.text.words import (
 MOST_READINGS = MOST_IN_SHEET  # largest number of readings; largest |w| first
 MOST_POINTS = MOST_IN_SHEET  # largest number of points; unused, then least precise points first
 _LEAST = (34, 12)  # smallest widths of the columns of labels and values
-_HEAD_ROW = 3
+_HEAD_ROW = 3  # row of the first headings, from 0
 _MOST_ASIDE = 50  # largest number of sentences on rejected points
 _MOST_LETTERS = 200  # largest number of letters of a heading with names of photographs
 

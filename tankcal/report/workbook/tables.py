@@ -11,7 +11,21 @@ HEAD_ROW = 3  # row of the headings of a table with a separate sheet
 
 
 def columns_of(book, table, rows=None):
-    """Return the columns of a declared Table (list of Column); rows None: rows of the record."""
+    """Return the columns of a declared table with their cells.
+
+    Parameters
+    ----------
+    book : Book
+        Workbook.
+    table : Table
+        Declaration of the table.
+    rows : list of dict, optional
+        Rows; None: the rows of the record.
+
+    Returns
+    -------
+    list of Column
+    """
     rows = table.rows(book.paper.record) if rows is None else rows
     return [_cells(book, book.paper, column, rows) for column in table.in_workbook(rows)]
 
@@ -110,7 +124,27 @@ def table_sheet(book, code, table, rows):
 
 
 def write_table(book, sheet, row, name, columns, **more):
-    """Write a table, or the text for a table without rows; return its last row."""
+    """Write a table, or the text for a table without rows; return its last row.
+
+    Parameters
+    ----------
+    book : Book
+        Workbook.
+    sheet : Sheet
+        Sheet of the table.
+    row : int
+        First row, from 0.
+    name : str
+        Name of the table.
+    columns : list of Column
+        Columns of the table.
+    **more
+        Further arguments of `Writer.table`.
+
+    Returns
+    -------
+    int
+    """
     if columns[0].cells:
         return book.table(sheet, row, name, columns, **more)
     book.put(sheet, row, 0, book.word("texts.no_rows"))
@@ -118,7 +152,23 @@ def write_table(book, sheet, row, name, columns, **more):
 
 
 def write_tables(book, sheet, row, tables):
-    """Write tables (title, name, columns) below each other; return the next row."""
+    """Write tables (title, name, columns) below each other; return the next row.
+
+    Parameters
+    ----------
+    book : Book
+        Workbook.
+    sheet : Sheet
+        Sheet of the tables.
+    row : int
+        First row, from 0.
+    tables : list of (str, str, list of Column)
+        Title, name and columns of each table.
+
+    Returns
+    -------
+    int
+    """
     widths = set_widths(book, sheet, *(columns for _, _, columns in tables))
     for title, name, columns in tables:
         book.heading(sheet, row, title, len(columns))

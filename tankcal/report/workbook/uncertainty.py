@@ -7,7 +7,7 @@ from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
 
-_HEAD_ROW = 3
+_HEAD_ROW = 3  # row of the first headings, from 0
 _RULE_FACTS = (40, 16, 16, 16, 16, 16)  # widths of the columns of the facts of a rule
 _FACT = 4  # column of the facts of the simulation, to the right of their labels
 
@@ -47,6 +47,7 @@ def _budget_columns(book, lines, u_m3):
 
 
 def _budget_table(book, sheet, row, name, columns, widths):
+    """Write a budget with bars of the shares; return its last row."""
     last = write_table(book, sheet, row, name, columns, widths=widths)
     heading = book.word("columns.share")
     share = next(i for i, column in enumerate(columns) if column.heading == heading)

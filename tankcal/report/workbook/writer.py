@@ -50,7 +50,19 @@ class Writer:
     # ---- cells
 
     def heading(self, sheet, row, text, columns):
-        """Write a heading, underlined across a number of columns."""
+        """Write a heading, underlined across a number of columns.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        row : int
+            Row, from 0.
+        text : str
+            Heading.
+        columns : int
+            Number of underlined columns.
+        """
         rule = {"bottom": 1, "bottom_color": ACCENT}
         look = self.format(bold=True, font_size=12, font_color=ACCENT, **rule)
         self.set_height(sheet, row, 21)
@@ -60,7 +72,19 @@ class Writer:
         sheet.write_string(row, 0, text, look)
 
     def put(self, sheet, row, column, value, **look):
-        """Write a value: numbers as numbers, other values as text, never as formula."""
+        """Write a value: numbers as numbers, other values as text, never as formula.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        row, column : int
+            Position, from 0.
+        value : object
+            Value of the record; a list is joined by commas, None is a dash.
+        **look
+            Properties of the format.
+        """
         if isinstance(value, bool):
             value = self.words["yes_no"]["yes" if value else "no"]
         if isinstance(value, list | tuple):
@@ -75,7 +99,19 @@ class Writer:
         sheet.write_string(row, column, str(value)[:_LONGEST_CELL], self.format(**look))
 
     def put_date(self, sheet, row, column, text, **look):
-        """Write an ISO date as a date of the spreadsheet, and any other text as text."""
+        """Write an ISO date as a date of the spreadsheet, and any other text as text.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        row, column : int
+            Position, from 0.
+        text : str
+            ISO date, or another text.
+        **look
+            Properties of the format.
+        """
         date = day(text)
         if date is None or len(str(text)) > len(date.isoformat()):
             self.put(sheet, row, column, text, **look)
@@ -83,11 +119,39 @@ class Writer:
             sheet.write_datetime(row, column, date, self.format(num_format=DATE, **look))
 
     def paragraph(self, sheet, row, text, widths, **look):
-        """Write a wrapped text across the columns of given widths and set the height of the row."""
+        """Write a wrapped text across the columns of given widths and set the height of the row.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        row : int
+            Row, from 0.
+        text : str
+            Text to write.
+        widths : sequence of float
+            Widths of the columns, in letters.
+        **look
+            Properties of the format.
+        """
         self.paragraph_in(sheet, row, 0, text, widths, **look)
 
     def paragraph_in(self, sheet, row, column, text, widths, **look):
-        """Write a wrapped text from `column` across columns of given widths."""
+        """Write a wrapped text from `column` across columns of given widths.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        row, column : int
+            Position of the first column, from 0.
+        text : str
+            Text to write.
+        widths : sequence of float
+            Widths of the columns, in letters.
+        **look
+            Properties of the format.
+        """
         look = self.format(**{"text_wrap": True, "align": "left", "valign": "top", **look})
         self.set_height(sheet, row, LINE_PT * lines_of(text, sum(widths)))
         if len(widths) > 1:
@@ -95,14 +159,36 @@ class Writer:
         sheet.write_string(row, column, text[:_LONGEST_CELL], look)
 
     def label(self, sheet, row, text, width):
-        """Write a wrapped label into the first column of given width; set the height of the row."""
+        """Write a wrapped label into the first column of given width; set the height of the row.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        row : int
+            Row, from 0.
+        text : str
+            Label.
+        width : float
+            Width of the first column, in letters.
+        """
         height = LINE_PT * lines_of(text, width)
         if height > self._heights.get((sheet.get_name(), row), LINE_PT):
             self.set_height(sheet, row, height)
         self.put(sheet, row, 0, text, valign="top", text_wrap=True)
 
     def set_height(self, sheet, row, points):
-        """Set the height of a row, in points, and store it for `keep_together`."""
+        """Set the height of a row, in points, and store it for `keep_together`.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        row : int
+            Row, from 0.
+        points : float
+            Height.
+        """
         sheet.set_row(row, points)
         self._heights[sheet.get_name(), row] = points
 
@@ -113,7 +199,17 @@ class Writer:
 
     @staticmethod
     def freeze(sheet, head_row, columns=0):
-        """Fix the headings and the first columns, and repeat the headings on printed pages."""
+        """Fix the headings and the first columns, and repeat the headings on printed pages.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        head_row : int
+            Row of the headings, from 0.
+        columns : int, optional
+            Number of fixed columns.
+        """
         sheet.freeze_panes(head_row + 1, columns)
         sheet.repeat_rows(head_row)
 

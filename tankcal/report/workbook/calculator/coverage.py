@@ -21,7 +21,21 @@ def normal(probability):
 
 
 def student(probability, dof, z):
-    """Return the formula of k; dof and z are cells, z with the value of `normal`."""
+    """Return the formula of k for finite degrees of freedom.
+
+    Parameters
+    ----------
+    probability : float
+        Coverage probability.
+    dof : str
+        Cell of the degrees of freedom.
+    z : str
+        Cell with k of the normal distribution (`normal`).
+
+    Returns
+    -------
+    str
+    """
     beta = f"BETAINV({probability!r},0.5,{dof}/2)"
     expansion = "0"
     # Horner's scheme in 1/dof, from the highest power.

@@ -85,6 +85,7 @@ def _results(book, table):
 
 
 def _workings(book, table):
+    """Return the blocks of intermediate results (list of Block)."""
     marks = marks_of(book.words)
 
     def density(value):

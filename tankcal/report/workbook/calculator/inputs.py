@@ -81,7 +81,19 @@ def inputs_of(table):
 
 
 def write_input(book, sheet, row, entry):
-    """Write an input into column B, with label, unit, name and validation."""
+    """Write an input into column B, with label, unit, name and validation.
+
+    Parameters
+    ----------
+    book : Book
+        Workbook.
+    sheet : Sheet
+        Sheet of the form.
+    row : int
+        Row of the cell, from 0.
+    entry : Input
+        Input to write.
+    """
     look = {"bg_color": INPUT, "border": 1, "border_color": ACCENT, "locked": False, "bold": True}
     look |= {"align": "right" if entry.low is not None else "left", "font_size": 11}
     sheet.set_row(row, 18)

@@ -65,7 +65,7 @@ PRODUCTS = (
 # Number of the last entry in the list of products: factor of the user.
 OWN_FACTOR = len(PRODUCTS) + 1
 CODES = (*(product.code for product in PRODUCTS), "own_factor")
-BASE_C = 15.0
+BASE_C = 15.0  # reference temperature of the products
 LEAST_C, MOST_C = -40.0, 90.0  # limits of the temperature of the liquid
 LEAST_KG_M3, MOST_KG_M3 = 300.0, 2000.0  # limits of the density with a factor of the user
 LEAST_FACTOR, MOST_FACTOR = 0.7, 1.3  # limits of a factor of the user
