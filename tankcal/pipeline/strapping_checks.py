@@ -26,8 +26,7 @@ SURELY_FLUSH, SURELY_SHORT_BY_PLATES = 0.25, (0.75, 1.25)
 FAR_REPEATS = 5  # least discrepancy of a course from the others, in limits of repeats
 FAR_LIMITS = 10  # discrepancy of a gross error, in limits of repeats: 5 mm of radius
 FARTHEST_M = 1.0  # largest standard deviation of a controlled discrepancy
-# Limit in standard deviations of ranges within a course; standard deviation over median.
-APART_SDS, SD_OVER_MEDIAN = 6.0, 1.4826
+APART_SDS = 6.0  # limit of the range of the readings within a course, in standard deviations
 
 
 def limit_of_repeats(circumference_m, table="repeats"):
