@@ -1,4 +1,4 @@
-"""From checked values to a Plan: rings become stations, patterns targets, tapes two points each."""
+"""Assemble a Plan from checked input: stations from rings, targets from patterns, ends from tapes."""
 
 from dataclasses import replace
 
@@ -11,13 +11,26 @@ from tankcal.planning.model import Known, Limits, Plan, Tie
 from tankcal.planning.obstacles import obstacles_of
 from tankcal.planning.patterns import photographs_of, setups_of, shell_of, tape_of, targets_of
 
+# Defaults of [limits]: largest angle of incidence, degrees, and fewest rays per point.
 INCIDENCE_DEG, RAYS = 70.0, 3
 
 
 def assemble_plan(job, given, bars, folder):
-    """The Plan of a Job and what its plan gives beside it (`given.Given`), both sound.
+    """Return the Plan of a Job and of the valid input of a plan.
 
-    bars  {name: {key: value}} of the stadias of its instruments
+    Parameters
+    ----------
+    job : Job
+    given : Given
+        Valid sections and tables of the plan.
+    bars : dict
+        {name: {key: value}} of the stadias in the instruments of the job.
+    folder : str
+        Name of the folder of the plan.
+
+    Returns
+    -------
+    Plan
     """
     pattern = given.single["pattern"]
     shell = shell_of(job, pattern)
@@ -67,7 +80,7 @@ def assemble_plan(job, given, bars, folder):
 
 
 def _listed(tables):
-    """Ties of the plan's tables."""
+    """Return the ties listed in the tables of a plan."""
     found = []
     for name, table in tables.items():
         if table is None:
@@ -85,9 +98,10 @@ def _listed(tables):
 
 
 def _known(control, places):
-    """Known points; a coordinate left blank is the nominal one, where the plan has the point.
+    """Return the known points; a blank coordinate takes its nominal value where the plan has it.
 
-    What is only compared (use = "check") is a place and no control.
+    A check point (use = "check") has a position, but no standard deviations: it does not constrain
+    the network.
     """
     if control is None:
         return []
@@ -100,7 +114,7 @@ def _known(control, places):
 
 
 def limits_of(given):
-    """The `Limits` of a [limits]."""
+    """Return the `Limits` of a [limits] section."""
     incidence = INCIDENCE_DEG if given["incidence_deg"] is None else given["incidence_deg"]
     return Limits(
         incidence_rad=float(np.radians(incidence)),
@@ -112,6 +126,6 @@ def limits_of(given):
 
 
 def _amplitudes(pattern):
-    """The `Amplitudes` of the wall to be surveyed: as assumed, but for what the plan says."""
+    """Return the `Amplitudes` of the wall: assumed values, replaced by those that the plan states."""
     given = (pattern[key] for key in ("form_mm", "common_form_mm"))
     return assumed_amplitudes(*(None if one is None else one / 1000 for one in given))

@@ -1,4 +1,4 @@
-"""Bases of a plan: a stadia over a station, read from another; what is read and how well."""
+"""Bases of a plan: distances from angles to a stadia over one station, read from another station."""
 
 from dataclasses import replace
 
@@ -12,13 +12,17 @@ from tankcal.survey.measurements import Readings
 from tankcal.survey.stadia import angle_of_distance_rad, distance_sd_m
 
 STADIA_FILE = "stadia.csv"
-NEW_SD_RAD = ARCSEC  # of a base that is added where the plan has none to follow
+NEW_SD_RAD = ARCSEC  # standard deviation of the angle of an added base if the plan has no base
 
 
 def bases_of(table, bars):
-    """The `Base`s of a plan's stadia.csv, row by row; () of none.
+    """Return the `Base`s of the rows of a plan's stadia.csv; () if it has no rows.
 
-    table  ColumnValues or None      bars  {name: of it} of the stadias there are
+    Parameters
+    ----------
+    table : ColumnValues or None
+    bars : dict
+        {name: {key: value}} of the stadias in the instruments.
     """
     if not has_rows(table):
         return ()
@@ -31,25 +35,25 @@ def bases_of(table, bars):
 
 
 def base_m(plan, one):
-    """Horizontal distance, m, that a Base of a Plan has at the nominal places."""
+    """Nominal horizontal length of a Base of a Plan, m."""
     points = plan.points
     return float(np.hypot(*(points[one.to] - points[one.setup])[:2]))
 
 
 def angle_of_base_rad(plan, one):
-    """Angle, rad, under which the bar of a Base will be seen."""
+    """Angle between the ends of the bar of a Base at its nominal length, rad."""
     return float(angle_of_distance_rad(base_m(plan, one), plan.bars[one.bar]))
 
 
 def base_sd_m(plan, one):
-    """Standard deviation, m, of the distance that one reading of a Base tells."""
+    """Standard deviation of the distance from one reading of a Base, m."""
     return float(distance_sd_m(angle_of_base_rad(plan, one), plan.bars[one.bar], one.angle_sd_rad))
 
 
 def readings_of_bases(plan, there):
-    """The `Readings` of the bases between points that are `there`, without values; () of none.
+    """Return the `Readings`, without values, of bases between the points `there`; () if no base.
 
-    Readings that are repeated stand there once, with the standard deviation of their mean.
+    Repeated readings of a base are one value with the standard deviation of their mean.
     """
     bases = [one for one in plan.bases if {one.setup, one.to} <= there]
     if not bases:
@@ -73,7 +77,7 @@ def readings_of_bases(plan, there):
 
 
 def by_ends(bases):
-    """{names of both ends: its `Base`s}: read from one of them, from the other, or again."""
+    """Group `Base`s by their two ends, whichever end each is read from: {names of ends: bases}."""
     found = {}
     for one in bases:
         ends = (one.setup, one.to)
@@ -82,9 +86,9 @@ def by_ends(bases):
 
 
 def new_bases(plan):
-    """Pairs of `Base`s, read from both ends, that a Plan with a stadia does not have yet.
+    """Return possible new pairs of `Base`s, read from both ends; () if the plan has no stadia.
 
-    They are between set-ups that sight each other.
+    Each pair connects two set-ups that sight each other and have no base yet.
     """
     if not plan.bars:
         return ()

@@ -1,19 +1,24 @@
-"""Set-ups that hang together: those that share two points, or that see one another."""
+"""Connected groups of set-ups: set-ups that share two points or sight each other."""
 
 import numpy as np
 
 from tankcal.messages import message
 
-SHARED = 2  # points that two levelled set-ups need in common
+SHARED = 2  # fewest common points that connect two levelled set-ups
 
 
 def find_separate_bodies(plan, seen):
-    """Tuples of names of set-ups: those of each body that hangs together with no other one.
+    """Return the groups of connected set-ups, each a tuple of names.
 
-    seen  visibility.Visibility
+    Parameters
+    ----------
+    plan : Plan
+    seen : Visibility
 
-    A set-up is a body of the points that it sees and its own place; control is one of the points
-    that are known in x, y and z. Bodies with two points in common are one.
+    Notes
+    -----
+    A set-up is a body: the points that it sees and its own position. Points known in x, y and z are
+    another body. Bodies with two common points are merged.
     """
     bodies = [([], {one.name for one in plan.known if np.isfinite(one.sd_m).all()})]
     for k, setup in enumerate(plan.setups):
@@ -27,7 +32,7 @@ def find_separate_bodies(plan, seen):
 
 
 def _linked(bodies):
-    """Two bodies with enough points in common, or None."""
+    """Return two bodies with enough common points, or None."""
     for i, one in enumerate(bodies):
         for other in bodies[:i]:
             if len(one[1] & other[1]) >= SHARED:
@@ -36,7 +41,7 @@ def _linked(bodies):
 
 
 def describe_separate_bodies(found):
-    """What parts `find_separate_bodies` found, in a sentence."""
+    """Return the message about the groups that `find_separate_bodies` returns."""
     told = "; ".join(", ".join(names) for names in found)
     return message(
         "plan_apart",

@@ -1,4 +1,4 @@
-"""Changes of a plan by one item: a station, a tape, a control point, a row, a repeated reading."""
+"""Changes of a plan by one item, such as a station, tape, control point or repeated reading."""
 
 from dataclasses import dataclass, replace
 
@@ -12,20 +12,32 @@ from tankcal.planning.wall.changes import WALL_ITEMS, wall_changes_of, wall_coun
 from tankcal.planning.wall.model import WallPlan
 
 ITEMS = ("photo_station", "setup", "tape", "base", "control_point", "target_row", "reading")
-IMAGES, SETS = "all image points", "all sets of the total station"  # what is read again
-ROW, OF_COURSE = "row ", "row in course "  # how the names of rows begin
-NEW = "N-"  # what the name of a thing that is added begins with
-MOST_READINGS = 100  # of one thing, as in plan.toml
-CONTROL_SD_M, TAPE_SD_M = 0.002, 0.001  # of what is added where the plan has none to follow
+IMAGES, SETS = "all image points", "all sets of the total station"  # names of repeated readings
+ROW, OF_COURSE = "row ", "row in course "  # prefixes of the names of rows
+NEW = "N-"  # prefix of the name of an added item
+MOST_READINGS = 100  # largest number of readings of one item, as in plan.toml
+# Standard deviations of an added control point or tape if the plan has none to copy.
+CONTROL_SD_M, TAPE_SD_M = 0.002, 0.001
 
 
 @dataclass(frozen=True)
 class Change:
-    """One change of a Plan: what is done to which item, the plan after it, and what it costs.
+    """One change of a Plan.
 
-    action  "add", "drop" or "repeat"      item  of ITEMS     name  of the item
-    cost    of the plan after less of the plan before
-    why     it cannot be; "": it can
+    Attributes
+    ----------
+    action : str
+        "add", "drop" or "repeat".
+    item : str
+        One of ITEMS.
+    name : str
+        Name of the item.
+    plan : Plan
+        The plan after the change.
+    cost : float
+        Cost of the plan after the change minus its cost before.
+    why : str
+        Reason why the change is impossible; "" if it is possible.
     """
 
     action: str
@@ -37,7 +49,7 @@ class Change:
 
 
 def cost_of(plan):
-    """What a plan costs: the sum of its items times the costs that it states.
+    """Total cost of the items of a plan.
 
     Parameters
     ----------
@@ -46,7 +58,7 @@ def cost_of(plan):
     Returns
     -------
     float
-        In the unit of those costs; 0 where the plan states none.
+        Number of items times the unit costs of the plan; 0 if the plan states no costs.
     """
     if isinstance(plan, WallPlan):
         return _priced(plan, wall_count(plan))
@@ -69,7 +81,20 @@ def _priced(plan, count):
 
 
 def changes_of(plan, actions=("add", "drop", "repeat"), items=ITEMS):
-    """Every Change of one item of a Plan or a WallPlan."""
+    """Return every Change of one item of a Plan or a WallPlan.
+
+    Parameters
+    ----------
+    plan : Plan or WallPlan
+    actions : tuple of str, optional
+        Actions to include: "add", "drop", "repeat".
+    items : tuple of str, optional
+        Items to include.
+
+    Returns
+    -------
+    tuple of Change
+    """
     if isinstance(plan, WallPlan):
         return tuple(_changes_of_wall(plan, actions, WALL_ITEMS if items is ITEMS else items))
     found = []
@@ -89,7 +114,7 @@ def _changes_of_wall(plan, actions, items):
             continue
         try:
             after, why = how(), ""
-        except TankcalError as error:  # its job is refused: nothing is left of that course
+        except TankcalError as error:  # invalid job: a course would have no readings left
             after, why = plan, str(error).splitlines()[0]
         yield Change(action, item, name, after, cost_of(after) - before, why)
 
@@ -123,15 +148,15 @@ def _azimuth(plan, place):
 
 
 def _about_z(turn):
-    """Rotation (3, 3) that turns places clockwise seen from above."""
+    """Rotation matrix (3, 3) that turns positions clockwise as seen from above."""
     c, s = np.cos(turn), np.sin(turn)
     return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _between(plan, places):
-    """(name, next name, place (3,)) half-way in azimuth between neighbours of one height.
+    """Yield (name, next name, position (3,)) half-way in azimuth between neighbours of one height.
 
-    places  {name: (3,)}
+    places: {name: position (3,)}.
     """
     levels = {}
     for name, xyz in places.items():
@@ -185,7 +210,7 @@ def _tapes(plan):
 
 
 def _without_tie(plan, tie):
-    """The Plan without a tape, and without the marks at its ends that nothing else needs."""
+    """Return the Plan without a tape, and without marks at its ends that no other item uses."""
     left = tuple(one for one in plan.ties if one is not tie)
     needed = {one.name for one in plan.known}.union(*((one.start, one.end) for one in left))
     spare = {tie.start, tie.end} - needed
@@ -197,7 +222,7 @@ def _without_tie(plan, tie):
 
 
 def _new_tapes(plan):
-    """A tape of each kind, where the plan has none yet: upright over the shell, along a tangent."""
+    """Yield a tape of each kind that the plan lacks: vertical along the shell, and horizontal."""
     like = [one for one in plan.ties if one.table == "distances"]
     tool = like[0].instrument if like else None
     sd = min((one.sd_m for one in like), default=TAPE_SD_M)
@@ -223,7 +248,7 @@ def _new_tapes(plan):
 
 
 def _bases(plan):
-    """Bases of a stadia, each with all readings of it: from one end, or exchanged."""
+    """Yield changes of bases; the readings of a base from either end change together."""
     for ends, mine in by_ends(plan.bases).items():
         name = "-".join(ends)
         left = tuple(one for one in plan.bases if one not in mine)
@@ -251,7 +276,7 @@ def _control(plan):
 
 
 def _spread_targets(plan, count):
-    """Numbers of targets around the shell, at its foot and at its top in turn."""
+    """Indices of targets around the shell, alternating between its foot and its top."""
     sections = list(dict.fromkeys(plan.targets.section))
     for k in range(count):
         row = sections[0] if k % 2 == 0 else sections[-1]
@@ -260,7 +285,7 @@ def _spread_targets(plan, count):
 
 
 def _rows(plan):
-    """Rows of targets dropped, as long as their course keeps one, and one added to each course."""
+    """Yield changes of target rows: drop one unless it is the last of a course, or add one."""
     targets = plan.targets
     for course in dict.fromkeys(targets.course.tolist()):
         after = _with_row(plan, course)
@@ -279,7 +304,7 @@ def _rows(plan):
 
 
 def _with_row(plan, course):
-    """The Plan with a row more in a course, all its rows at Gauss levels; None: too low for it."""
+    """Return the Plan with another row in a course, all rows at Gauss levels; None if too low."""
     targets = plan.targets
     mine = targets.course == course
     rows = sorted({*zip(targets.height_m[mine], np.array(targets.section)[mine], strict=True)})

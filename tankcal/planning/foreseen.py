@@ -1,4 +1,4 @@
-"""What the run of a planned survey will warn of, and what the plan counts on in vain."""
+"""Warnings of a planned survey: those that the job would issue, and planned items without effect."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from tankcal.planning.given import PLAN_FILE
 
 
 def foreseen(prediction):
-    """A tuple of Problem: those of the plan, of its network, of the wall and of the table."""
+    """Return a tuple of Problem for the plan, its network, the wall and the table."""
     tabled = prediction.tabled
     of_table = check_table(_correlated(tabled), tabled.wall, tabled.made)
     of_run = (
@@ -35,7 +35,7 @@ def foreseen(prediction):
 
 
 def _correlated(tabled):
-    """The job of a PredictedTable, its points with all that they have in common."""
+    """Return the job of a PredictedTable with the full covariance of its points."""
     points, adjusted = tabled.job.points, tabled.covariance.adjusted
     number = {name: i for i, name in enumerate(adjusted.survey.points)}
     covariance = PredictedCovariance(adjusted, np.array([number[name] for name in points.names]))
@@ -43,7 +43,7 @@ def _correlated(tabled):
 
 
 def _unseen(prediction):
-    """Targets that nothing sees."""
+    """Return a Problem about targets that are not determined."""
     targets = set(prediction.plan.targets.names)
     lost = [one.name for one in prediction.undetermined if one.name in targets]
     if not lost:
@@ -60,9 +60,9 @@ def _unseen(prediction):
 
 
 def idle_ties(plan, points):
-    """Tapes, bases, height differences and plumb lines with an end that is not determined.
+    """Return a Problem about tapes, bases, levels and plumb lines with an undetermined end.
 
-    points  PointOutlook of all points
+    points: PointOutlook of all points.
     """
     lost = {one.name for one in points if one.undetermined}
     ties = [(one.name, (one.start, one.end)) for one in plan.ties]
@@ -86,7 +86,7 @@ def idle_ties(plan, points):
 
 
 def _uncontrolled(groups):
-    """Kinds of readings (`GroupReliability`) of which nothing controls some or all."""
+    """Return a Problem about kinds of readings (`GroupReliability`) with uncontrolled values."""
     idle = [_of_group(one) for one in groups if one.uncontrolled]
     if not idle:
         return ()

@@ -1,7 +1,7 @@
-"""A plan as measurements: those that will be made, with the values that they would have.
+"""Measurements of a plan, with the values that would be read at the nominal positions.
 
-Values are what the observations compute from the nominal places, without errors or with errors
-drawn from their standard deviations.
+Values are computed from the nominal positions, either without errors or with errors drawn from
+their standard deviations.
 """
 
 from dataclasses import replace
@@ -19,16 +19,14 @@ from tankcal.survey.readings import read_distance_m
 
 
 def nominal_of(plan):
-    """surveys.Nominal of a Plan."""
+    """Return the surveys.Nominal of a Plan."""
     return Nominal(plan.points, {one.name: (one.xyz_m, one.rotation) for one in plan.photos})
 
 
 def measurements_of(plan, seen):
-    """job.Measurements of a Plan: what is measured and how well; values of readings are 0.
+    """Return the job.Measurements of a Plan: standard deviations of all readings, with values 0.
 
-    seen  visibility.Visibility
-
-    Readings that are repeated stand there once, with the standard deviation of their mean.
+    Repeated readings are one value with the standard deviation of their mean.
     """
     given, counts = plan.job.measurements, measurable(plan, seen)
     seen = replace(seen, on_photo=seen.on_photo & counts, on_setup=seen.on_setup & counts)
@@ -76,7 +74,7 @@ def _control(plan):
 
 
 def targets_of(plan):
-    """The targets of a plan as a survey would have them: its targets.csv.
+    """Return the targets of a plan as the table targets.csv of a survey.
 
     Parameters
     ----------
@@ -98,7 +96,7 @@ def targets_of(plan):
 
 
 def _sights(plan, seen):
-    """Readings of directions, zenith angles and slope distances of all set-ups."""
+    """Return the readings of directions, zenith angles and slope distances of all set-ups."""
     for table, key in (
         ("directions", "direction_sd_rad"),
         ("zenith_angles", "zenith_sd_rad"),
@@ -117,7 +115,7 @@ def _sights(plan, seen):
 
 
 def _ties(plan, there):
-    """Readings of tapes, levels and plumb lines between points that are there, by name."""
+    """Return the readings of tapes, levels and plumb lines between the points `there`."""
     for table in TAPED:
         ties = [one for one in plan.ties if one.table == table and {one.start, one.end} <= there]
         if not ties:
@@ -141,10 +139,17 @@ def _readings(table, start, end, sd, **more):
 
 
 def draw_measurements(plan, measurements, predicted, rng=None):
-    """The Measurements with the values that they would have at the nominal places.
+    """Return the Measurements with values computed from the nominal positions.
 
-    predicted  surveys.Predicted of the same        rng  None: without errors; else every reading is
-               off by its own, and those of an instrument by its scale and offset together
+    Parameters
+    ----------
+    plan : Plan
+    measurements : Measurements
+    predicted : Predicted
+        Prediction of the measurements.
+    rng : numpy.random.Generator, optional
+        None: no errors. Otherwise each reading has its own error, and the readings of an instrument
+        share errors of its scale and offset.
     """
     values, draw = _computed(predicted), _drawn(rng)
     off = {one.name: _off(one, draw) for one in measurements.instruments}
@@ -162,14 +167,14 @@ def draw_measurements(plan, measurements, predicted, rng=None):
 
 
 def _drawn(rng):
-    """Function (value, sd) -> value with an error."""
+    """Return a function (value, sd) -> value with an error."""
     if rng is None:
         return lambda value, sd: np.array(value, dtype=float)
     return lambda value, sd: value + rng.standard_normal(np.shape(value)) * sd
 
 
 def _computed(predicted):
-    """{(table, horizontal, names): value} of all readings, computed from the nominal places."""
+    """Return {(table, horizontal, names): value} of all readings at the nominal positions."""
     found, problem = {}, predicted.adjusted.problem
     for one in (*problem.observations, *(held.observations for held in problem.exact)):
         trace = one.trace
@@ -179,13 +184,13 @@ def _computed(predicted):
         for row, value in enumerate(computed[:, 0].tolist()):
             key = trace.table, bool(getattr(one, "horizontal", False))
             found[*key, *trace.ids[row]] = value
-            if KINDS[trace.table].either_way:  # a tape is read either way
+            if KINDS[trace.table].either_way:  # a tape may be read from either end
                 found[*key, *reversed(trace.ids[row])] = value
     return found
 
 
 def _filled(readings, values, draw, tools, setups):
-    """Readings with their values; those of points that are left out stay 0."""
+    """Return readings with their values; readings of points that are left out keep the value 0."""
     starts = readings.setup or readings.start
     horizontal = readings.horizontal
     flat = np.zeros(len(starts), dtype=bool) if horizontal is None else horizontal
@@ -200,12 +205,12 @@ def _filled(readings, values, draw, tools, setups):
 
 
 def _off(tool, draw):
-    """(scale, offset m) by which an instrument is off; 0 where it is not known beforehand."""
+    """Error (scale, offset m) of an instrument; 0 for a quantity without a prior."""
     return tuple(float(draw(0.0, np.nan_to_num(u))) for u in (tool.u_scale, tool.u_offset_m))
 
 
 def _read(true_m, name, tools, off):
-    """What an instrument reads of a true distance, at the temperature of its certificate."""
+    """Reading of a true distance by an instrument at the temperature of its certificate."""
     if name is None:
         return true_m
     scale, offset = off[name]
