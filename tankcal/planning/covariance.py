@@ -43,8 +43,8 @@ class PredictedCovariance:
     def _in_frame(self, matrix):
         """Product of C, in the datum of the network, and a matrix."""
         columns = self.adjusted.problem.layout.points[self.points].ravel()
-        found = covariances(self.adjusted.solution.cofactor, columns, matrix.T)
-        return np.vstack([found, np.zeros((1, found.shape[1]))])[columns]
+        product = covariances(self.adjusted.solution.cofactor, columns, matrix.T)
+        return np.vstack([product, np.zeros((1, product.shape[1]))])[columns]
 
     @cached_property
     def _basis(self):
@@ -69,7 +69,7 @@ class PredictedCovariance:
         return self.adjusted.covariance_m2(self.points) - cross - cross.T
 
     def of_each_point(self):
-        """Sparse matrix (3n, 3n) of the covariance blocks of single points, without correlations."""
+        """Sparse matrix (3n, 3n) of the covariance blocks of single points, no correlations."""
         n = len(self.points)
         basis, across = (part.reshape(n, 3, 4) for part in (self._basis, self._across))
         cross = basis @ np.swapaxes(across, 1, 2)

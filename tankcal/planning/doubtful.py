@@ -77,9 +77,9 @@ def single_readings(plan, observations):
     if trace.table in TAPED:
         return _of_ties(plan, observations)
     if trace.table in SIGHTED:
-        times = {one.name: one.sets for one in plan.setups}
+        times = {setup.name: setup.sets for setup in plan.setups}
     elif observations.kind == ImageCoordinates.kind:
-        times = {one.name: one.readings for one in plan.photos}
+        times = {photo.name: photo.readings for photo in plan.photos}
     count = np.array([times.get(ids[0], 1) for ids in trace.ids])
     turn = np.zeros(len(count))
     if trace.table == "directions":
@@ -96,18 +96,18 @@ def _share_of_set(directions):
 def _of_ties(plan, observations):
     """Return SingleReadings of ties; ties of one line with different sds are separate groups."""
     trace, lots = observations.trace, defaultdict(list)
-    for one in plan.ties:
-        if one.table == trace.table and one.sd_m > 0:
-            line = _line(one.table, (one.start, one.end), one.instrument, one.kind == "horizontal")
-            lots[line].append((one.sd_m**-2, one.readings))
-    for one in plan.bases if trace.table == "distances" else ():
-        line = _line(trace.table, (one.setup, one.to), one.bar, True)
-        lots[line].append((base_sd_m(plan, one) ** -2, one.readings))
+    for tie in plan.ties:
+        if tie.table == trace.table and tie.sd_m > 0:
+            line = _line(tie.table, (tie.start, tie.end), tie.instrument, tie.kind == "horizontal")
+            lots[line].append((tie.sd_m**-2, tie.readings))
+    for base in plan.bases if trace.table == "distances" else ():
+        line = _line(trace.table, (base.setup, base.to), base.bar, True)
+        lots[line].append((base_sd_m(plan, base) ** -2, base.readings))
     flat, of, share, count = getattr(observations, "horizontal", False), [], [], []
     for number, (ids, group) in enumerate(zip(trace.ids, trace.group, strict=True)):
-        mine = lots[_line(trace.table, ids, group, flat)]
-        weight, times = np.array(mine).T
-        of += [number] * len(mine)
+        lot = lots[_line(trace.table, ids, group, flat)]
+        weight, times = np.array(lot).T
+        of += [number] * len(lot)
         share += (weight / (weight @ times)).tolist()
         count += times.astype(int).tolist()
     return SingleReadings(np.array(of), np.array(share), np.array(count), np.zeros(len(of)))
@@ -184,17 +184,17 @@ def reliability(plan, predicted, covariance, by_points_m2):
     adjusted = predicted.adjusted
     problem, solution = adjusted.problem, adjusted.solution
     pull = _pull(solution, problem.layout.points[covariance.points].ravel(), by_points_m2)
-    found = []
-    for number, one in enumerate(problem.observations):
-        if one.trace is None:
+    groups = []
+    for number, table in enumerate(problem.observations):
+        if table.trace is None:
             continue
         jac = solution.cofactor.jacobians[number]
         r = 1.0 - solution.cofactor.leverage(number, jac)
         columns = problem.model.groups[number].columns
         effect = np.abs(np.einsum("nmk,nk->nm", jac, pull[columns]))
-        single = single_readings(plan, one)
-        found += _by_name(one, single, single.redundancy(r), effect)
-    return tuple(found)
+        single = single_readings(plan, table)
+        groups += _by_name(table, single, single.redundancy(r), effect)
+    return tuple(groups)
 
 
 def _pull(solution, columns, gradient):
@@ -205,32 +205,32 @@ def _pull(solution, columns, gradient):
     return np.append(covariances(solution.cofactor, columns, gradient[None])[:, 0], 0.0)
 
 
-def _by_name(one, single, redundancy, effect):
+def _by_name(table, single, redundancy, effect):
     """Yield the GroupReliability of each name in one table of observations.
 
     single: SingleReadings of k readings; redundancy: (k, m) of the readings; effect: (n, m) of the
     rows.
     """
-    trace = one.trace.taken(single.of)
+    trace = table.trace.taken(single.of)
     names = np.array(trace.group, dtype=object)
     controlled = redundancy > UNCONTROLLED
     size = np.where(controlled, noncentrality() / np.sqrt(np.where(controlled, redundancy, 1)), 0)
-    weight = one.using(np.ones(len(one))).weight[single.of] * single.root()
+    weight = table.using(np.ones(len(table))).weight[single.of] * single.root()
     effect = effect[single.of] * single.root()
     blunder, volume = size / weight, size * effect
     per_unit = np.where(controlled, -1.0, effect * weight)
     for name in dict.fromkeys(names):
-        mine = np.flatnonzero(names == name)
+        members = np.flatnonzero(names == name)
         worst, moves, alone = (
-            mine[np.argmax(part[mine].max(axis=1))] for part in (blunder, volume, per_unit)
+            members[np.argmax(part[members].max(axis=1))] for part in (blunder, volume, per_unit)
         )
-        known, is_bare = controlled[mine].any(), bool((~controlled[mine]).any())
-        count = single.count[mine]
+        known, is_bare = controlled[members].any(), bool((~controlled[members]).any())
+        count = single.count[members]
         yield GroupReliability(
-            kind=one.kind, name=str(name), unit=one.unit,
+            kind=table.kind, name=str(name), unit=table.unit,
             count=int(count.sum() * redundancy.shape[1]),
-            uncontrolled=int(count @ np.sum(~controlled[mine], axis=1)),
-            redundancy=float(count @ redundancy[mine].mean(axis=1) / count.sum()),
+            uncontrolled=int(count @ np.sum(~controlled[members], axis=1)),
+            redundancy=float(count @ redundancy[members].mean(axis=1) / count.sum()),
             blunder=float(blunder[worst].max()) if known else float("nan"),
             of=trace.ids[worst],
             volume_m3=float(volume[moves].max()) if known else float("nan"),

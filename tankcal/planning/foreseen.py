@@ -1,4 +1,4 @@
-"""Warnings of a planned survey: those that the job would issue, and planned items without effect."""
+"""Warnings of a planned survey: those that the job would issue, and items without effect."""
 
 from dataclasses import replace
 
@@ -22,7 +22,11 @@ def foreseen(prediction):
     of_run = (
         *prediction.predicted.frame.warnings,
         *open_questions(tabled.job, prediction.datum, tabled.job.points.causes),
-        *(one for one in of_table if getattr(one.expected, "code", None) not in OF_SCATTER),
+        *(
+            problem
+            for problem in of_table
+            if getattr(problem.expected, "code", None) not in OF_SCATTER
+        ),
     )
     return (
         *prediction.plan.warnings,
@@ -30,7 +34,10 @@ def foreseen(prediction):
         *idle_ties(prediction.plan, prediction.points),
         *_uncontrolled(prediction.reliability),
         *check_bases(prediction.measurements),
-        *(replace(one, file=PLAN_FILE) if one.file == SETTINGS_FILE else one for one in of_run),
+        *(
+            replace(problem, file=PLAN_FILE) if problem.file == SETTINGS_FILE else problem
+            for problem in of_run
+        ),
     )
 
 
@@ -45,7 +52,7 @@ def _correlated(tabled):
 def _unseen(prediction):
     """Return a Problem about targets that are not determined."""
     targets = set(prediction.plan.targets.names)
-    lost = [one.name for one in prediction.undetermined if one.name in targets]
+    lost = [point.name for point in prediction.undetermined if point.name in targets]
     if not lost:
         return ()
     text = message(
@@ -64,13 +71,13 @@ def idle_ties(plan, points):
 
     points: PointOutlook of all points.
     """
-    lost = {one.name for one in points if one.undetermined}
-    ties = [(one.name, (one.start, one.end)) for one in plan.ties]
-    ties += [(one.name, (one.setup, one.to)) for one in plan.bases]
+    lost = {point.name for point in points if point.undetermined}
+    ties = [(tie.name, (tie.start, tie.end)) for tie in plan.ties]
+    ties += [(base.name, (base.setup, base.to)) for base in plan.bases]
     idle = [
-        message("plan_tie_end", "{tie} ({points})", tie=name, points=found)
+        message("plan_tie_end", "{tie} ({points})", tie=name, points=lost_ends)
         for name, ends in ties
-        if (found := [end for end in ends if end in lost])
+        if (lost_ends := [end for end in ends if end in lost])
     ]
     if not idle:
         return ()
@@ -87,7 +94,7 @@ def idle_ties(plan, points):
 
 def _uncontrolled(groups):
     """Return a Problem about kinds of readings (`GroupReliability`) with uncontrolled values."""
-    idle = [_of_group(one) for one in groups if one.uncontrolled]
+    idle = [_of_group(group) for group in groups if group.uncontrolled]
     if not idle:
         return ()
     text = message(
@@ -98,14 +105,14 @@ def _uncontrolled(groups):
     return (Problem(PLAN_FILE, text),)
 
 
-def _of_group(one):
-    if one.count == 1:
+def _of_group(group):
+    if group.count == 1:
         template = "the only value of {group} ({points})"
-        return message("plan_only_value", template, group=one.kind, points="-".join(one.of))
+        return message("plan_only_value", template, group=group.kind, points="-".join(group.of))
     return message(
         "plan_some_values",
         "{uncontrolled} of {count} values of {group}",
-        uncontrolled=one.uncontrolled,
-        count=one.count,
-        group=one.kind,
+        uncontrolled=group.uncontrolled,
+        count=group.count,
+        group=group.kind,
     )

@@ -63,7 +63,7 @@ def base_m(overlap, frame_mm, scale):
 
 
 def parallax_sd(image_sd):
-    """Standard deviation s_p = sqrt(2) s_x of a difference of two image coordinates, in their unit."""
+    """Standard deviation s_p = sqrt(2) s_x of a difference of two image coordinates."""
     return np.sqrt(2) * positive("image_sd", image_sd)
 
 
@@ -119,11 +119,11 @@ def classes_reached(sd_m, limits):
         Limits of one component with `scale` and `sd_m`, best class of a scale first
         (`tankcal.calibration.product.limits.Limit`).
     """
-    found = {}
+    best = {}
     for limit in limits:
-        if limit.scale not in found and sd_m <= limit.sd_m:
-            found[limit.scale] = limit
-    return tuple(found.values())
+        if limit.scale not in best and sd_m <= limit.sd_m:
+            best[limit.scale] = limit
+    return tuple(best.values())
 
 
 def close_range_sd_m(design, scale, image_sd_mm):
@@ -165,8 +165,8 @@ def hyperfocal_m(focal_mm, f_number, sharp_mm):
 def depth_of_field_m(focal_mm, f_number, sharp_mm, focus_m):
     """Nearest and farthest sharp distance from the lens, m.
 
-    The farthest distance is inf if the focus is at the hyperfocal distance or beyond. The parameters
-    are those of `hyperfocal_m`, and the focus distance focus_m, m.
+    The farthest distance is inf if the focus is at the hyperfocal distance or beyond. focus_m is
+    the focus distance, m; the other parameters are those of `hyperfocal_m`.
     """
     h, f = hyperfocal_m(focal_mm, f_number, sharp_mm), METRE * focal_mm
     s = _beyond(f, focus_m)
@@ -241,13 +241,13 @@ def target_diameter_m(scale, pixel_mm, pixels=PIXELS_OF_CIRCLE, slant_rad=0.0):
 
 
 def coded_target_m(scale, pixel_mm, cells, pixels=PIXELS_OF_BIT, slant_rad=0.0):
-    """Smallest side of a coded target, m; `cells` is the number of cells across, border included."""
+    """Smallest side of a coded target, m; `cells` counts the cells across, border included."""
     return positive("cells", cells) * target_diameter_m(scale, pixel_mm, pixels, slant_rad)
 
 
 def positive(name, value):
     """Return the value; raise ValueError unless it is finite and above 0."""
-    found = np.asarray(value, dtype=float)
-    if not (np.isfinite(found).all() and (found > 0).all()):
+    values = np.asarray(value, dtype=float)
+    if not (np.isfinite(values).all() and (values > 0).all()):
         raise ValueError(f"found {name} = {value!r}; expected a number above 0")
-    return value if np.isscalar(value) else found
+    return value if np.isscalar(value) else values

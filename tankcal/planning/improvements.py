@@ -131,11 +131,11 @@ def what_helps(plan, changes=None, progress=None, before=None):
     changes = changes_of(plan) if changes is None else changes
     before = predict(plan) if before is None else before
     progress = progress or (lambda text, done, total: None)
-    found = []
-    for number, one in enumerate(changes, 1):
+    effects = []
+    for number, change in enumerate(changes, 1):
         progress(message("plan_trying_changes", "trying changes"), number, len(changes))
-        found.append(_effect(one, before))
-    return tuple(sorted(found, key=lambda one: one.relative_u))
+        effects.append(_effect(change, before))
+    return tuple(sorted(effects, key=lambda effect: effect.relative_u))
 
 
 def what_would_do(plan, progress=None):
@@ -153,8 +153,8 @@ def what_would_do(plan, progress=None):
     tuple of Effect
         Their difference is nan, as the plan has no U before.
     """
-    found = what_helps(plan, changes_of(plan, ("add",), OF_FRAME), progress, NOTHING_BEFORE)
-    return tuple(one for one in found if not one.why)
+    effects = what_helps(plan, changes_of(plan, ("add",), OF_FRAME), progress, NOTHING_BEFORE)
+    return tuple(effect for effect in effects if not effect.why)
 
 
 def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, progress=None):
@@ -180,7 +180,7 @@ def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, progres
     Path
     """
     start = now = predict(plan)
-    limit, made, tried = plan.limits.relative_u, [], 0
+    limit, steps_done, tried = plan.limits.relative_u, [], 0
     actions = ("add", "repeat") if add else ("drop",)
     if isinstance(plan, WallPlan) and items is ITEMS:
         items = SEARCHED
@@ -193,9 +193,9 @@ def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, progres
         step, after = _best(effects, now, limit, add)
         if step is None:
             break
-        made.append(step)
+        steps_done.append(step)
         now = after
-    return Path(start, tuple(made), now, tried)
+    return Path(start, tuple(steps_done), now, tried)
 
 
 def smallest(plan, progress=None, items=ITEMS):
@@ -237,18 +237,18 @@ def _best(effects, now, limit, add):
     therefore predicted anew and must still qualify. Dropping an item must not leave a controlled
     reading without control, as a blunder in it would enter the table.
     """
-    for one in _candidates(effects, now, limit, add):
-        after = predict(one.change.plan)
+    for effect in _candidates(effects, now, limit, add):
+        after = predict(effect.change.plan)
         u = after.relative_u
         if u < now.relative_u if add else u <= limit and _uncontrolled(after) <= _uncontrolled(now):
             top = float(after.table.U_m3[-1])
-            return replace(one, relative_u=u, difference=u - now.relative_u, U_m3=top), after
+            return replace(effect, relative_u=u, difference=u - now.relative_u, U_m3=top), after
     return None, None
 
 
 def _uncontrolled(prediction):
     """Number of uncontrolled readings."""
-    return sum(one.uncontrolled for one in prediction.reliability)
+    return sum(group.uncontrolled for group in prediction.reliability)
 
 
 def _candidates(effects, now, limit, add):
@@ -256,15 +256,15 @@ def _candidates(effects, now, limit, add):
 
     Dropping an item must not add to the targets that are weak already.
     """
-    works, before = [one for one in effects if not one.why], now.relative_u
+    works, before = [effect for effect in effects if not effect.why], now.relative_u
     if add:
-        gains = [one for one in works if one.relative_u < (1 - LEAST_GAIN) * before]
-        return sorted(gains, key=lambda one: _worth(one, before), reverse=True)
-    keeps = [one for one in works if limit is not None and one.relative_u <= limit]
+        gains = [effect for effect in works if effect.relative_u < (1 - LEAST_GAIN) * before]
+        return sorted(gains, key=lambda gain: _worth(gain, before), reverse=True)
+    keeps = [effect for effect in works if limit is not None and effect.relative_u <= limit]
     if not isinstance(now.plan, WallPlan):
         poor = poor_targets(now.plan, now.seen, now.tabled)
-        keeps = [one for one in keeps if one.poor <= poor]
-    return sorted(keeps, key=lambda one: _saving(one, before), reverse=True)
+        keeps = [effect for effect in keeps if effect.poor <= poor]
+    return sorted(keeps, key=lambda effect: _saving(effect, before), reverse=True)
 
 
 def poor_targets(plan, seen, tabled):

@@ -23,7 +23,7 @@ class OfTable:
 
     @property
     def relative_u(self):
-        """U over volume of the quantity in the plan's limit: the full tank or the worst delivery."""
+        """U over volume of the limited quantity: the full tank or the worst delivery."""
         return limited_u(self.tabled, self.plan.limits)
 
     @property

@@ -20,7 +20,9 @@ from tankcal.survey.readings import read_distance_m
 
 def nominal_of(plan):
     """Return the surveys.Nominal of a Plan."""
-    return Nominal(plan.points, {one.name: (one.xyz_m, one.rotation) for one in plan.photos})
+    return Nominal(
+        plan.points, {photo.name: (photo.xyz_m, photo.rotation) for photo in plan.photos}
+    )
 
 
 def measurements_of(plan, seen):
@@ -30,28 +32,32 @@ def measurements_of(plan, seen):
     """
     given, counts = plan.job.measurements, measurable(plan, seen)
     seen = replace(seen, on_photo=seen.on_photo & counts, on_setup=seen.on_setup & counts)
-    there = {name for name, is_there in zip(seen.points, counts, strict=True) if is_there}
+    determined = {name for name, is_there in zip(seen.points, counts, strict=True) if is_there}
     return replace(
         given,
-        photos=tuple(_photo(one) for one in plan.photos),
+        photos=tuple(_photo(photo) for photo in plan.photos),
         image_points=_image_points(plan, seen),
         control=_control(plan),
         targets=targets_of(plan),
-        setups=tuple(Setup(one.name, one.name, one.instrument) for one in plan.setups),
-        readings=(*_sights(plan, seen), *_ties(plan, there), *readings_of_bases(plan, there)),
+        setups=tuple(Setup(setup.name, setup.name, setup.instrument) for setup in plan.setups),
+        readings=(
+            *_sights(plan, seen),
+            *_ties(plan, determined),
+            *readings_of_bases(plan, determined),
+        ),
     )
 
 
-def _photo(one):
-    values = np.concatenate([one.xyz_m, angles_of(one.rotation)])
-    return Photo(one.name, one.camera, values, np.full(6, np.nan))
+def _photo(photo):
+    values = np.concatenate([photo.xyz_m, angles_of(photo.rotation)])
+    return Photo(photo.name, photo.camera, values, np.full(6, np.nan))
 
 
 def _image_points(plan, seen):
     photo, point = np.nonzero(seen.on_photo)
     if not len(photo):
         return None
-    sd = np.array([one.sd_mm / np.sqrt(one.readings) for one in plan.photos])
+    sd = np.array([photo.sd_mm / np.sqrt(photo.readings) for photo in plan.photos])
     return ImageReadings(
         photo=tuple(plan.photos[k].name for k in photo.tolist()),
         point=tuple(seen.points[k] for k in point.tolist()),
@@ -65,9 +71,9 @@ def _control(plan):
     if not plan.known:
         return None
     return KnownPoints(
-        point=tuple(one.name for one in plan.known),
-        xyz_m=np.array([one.xyz_m for one in plan.known]),
-        sd_m=np.array([one.sd_m for one in plan.known]),
+        point=tuple(control_point.name for control_point in plan.known),
+        xyz_m=np.array([control_point.xyz_m for control_point in plan.known]),
+        sd_m=np.array([control_point.sd_m for control_point in plan.known]),
         system=(None,) * len(plan.known),
         check=np.zeros(len(plan.known), dtype=bool),
     )
@@ -85,13 +91,13 @@ def targets_of(plan):
     Targets
         As a job reads them; heights and offsets in m.
     """
-    one = plan.targets
+    targets = plan.targets
     return Targets(
-        one.names,
-        one.section,
-        one.generatrix,
-        one.xyz_m[:, 2],
-        np.full(len(one.names), one.offset_m),
+        targets.names,
+        targets.section,
+        targets.generatrix,
+        targets.xyz_m[:, 2],
+        np.full(len(targets.names), targets.offset_m),
     )
 
 
@@ -103,31 +109,33 @@ def _sights(plan, seen):
         ("slope_distances", "distance_sd_m"),
     ):
         setup, end, sd = [], [], []
-        for k, one in enumerate(plan.setups):
-            if getattr(one, key) is None:
+        for k, instrumented in enumerate(plan.setups):
+            if getattr(instrumented, key) is None:
                 continue
             names = [seen.points[i] for i in np.flatnonzero(seen.on_setup[k])]
-            setup += [one.name] * len(names)
+            setup += [instrumented.name] * len(names)
             end += names
-            sd += [getattr(one, key) / np.sqrt(one.sets)] * len(names)
+            sd += [getattr(instrumented, key) / np.sqrt(instrumented.sets)] * len(names)
         if end:
             yield _readings(table, [None] * len(end), end, sd, setup=tuple(setup))
 
 
-def _ties(plan, there):
+def _ties(plan, determined):
     """Return the readings of tapes, levels and plumb lines between the points `there`."""
     for table in TAPED:
-        ties = [one for one in plan.ties if one.table == table and {one.start, one.end} <= there]
+        ties = [
+            tie for tie in plan.ties if tie.table == table and {tie.start, tie.end} <= determined
+        ]
         if not ties:
             continue
         more = {}
         if table == "distances":
             more = {
-                "instrument": tuple(one.instrument for one in ties),
-                "horizontal": np.array([one.kind == "horizontal" for one in ties]),
+                "instrument": tuple(tie.instrument for tie in ties),
+                "horizontal": np.array([tie.kind == "horizontal" for tie in ties]),
             }
-        sd = [one.sd_m / np.sqrt(one.readings) for one in ties]
-        yield _readings(table, [one.start for one in ties], [one.end for one in ties], sd, **more)
+        sd = [tie.sd_m / np.sqrt(tie.readings) for tie in ties]
+        yield _readings(table, [tie.start for tie in ties], [tie.end for tie in ties], sd, **more)
 
 
 def _readings(table, start, end, sd, **more):
@@ -152,16 +160,16 @@ def draw_measurements(plan, measurements, predicted, rng=None):
         share errors of its scale and offset.
     """
     values, draw = _computed(predicted), _drawn(rng)
-    off = {one.name: _off(one, draw) for one in measurements.instruments}
-    tools = {one.name: one for one in measurements.instruments}
-    setups = {one.name: one for one in measurements.setups}
+    off = {tool.name: _off(tool, draw) for tool in measurements.instruments}
+    tools = {tool.name: tool for tool in measurements.instruments}
+    setups = {setup.name: setup for setup in measurements.setups}
     images, control = measurements.image_points, measurements.control
     if images is not None:
         images = replace(images, xy_mm=draw(images.xy_mm, images.sd_mm))
     if control is not None:
         control = replace(control, xyz_m=draw(control.xyz_m, np.nan_to_num(control.sd_m)))
     readings = tuple(
-        _filled(one, values, draw, (tools, off), setups) for one in measurements.readings
+        _filled(reading, values, draw, (tools, off), setups) for reading in measurements.readings
     )
     return replace(measurements, image_points=images, control=control, readings=readings)
 
@@ -175,18 +183,18 @@ def _drawn(rng):
 
 def _computed(predicted):
     """Return {(table, horizontal, names): value} of all readings at the nominal positions."""
-    found, problem = {}, predicted.adjusted.problem
-    for one in (*problem.observations, *(held.observations for held in problem.exact)):
-        trace = one.trace
+    by_key, problem = {}, predicted.adjusted.problem
+    for table in (*problem.observations, *(held.observations for held in problem.exact)):
+        trace = table.trace
         if trace is None or not trace.table:
             continue
-        computed = one.computed(problem.state, False)[0]
+        computed = table.computed(problem.state, False)[0]
         for row, value in enumerate(computed[:, 0].tolist()):
-            key = trace.table, bool(getattr(one, "horizontal", False))
-            found[*key, *trace.ids[row]] = value
+            key = trace.table, bool(getattr(table, "horizontal", False))
+            by_key[*key, *trace.ids[row]] = value
             if KINDS[trace.table].either_way:  # a tape may be read from either end
-                found[*key, *reversed(trace.ids[row])] = value
-    return found
+                by_key[*key, *reversed(trace.ids[row])] = value
+    return by_key
 
 
 def _filled(readings, values, draw, tools, setups):
@@ -197,8 +205,10 @@ def _filled(readings, values, draw, tools, setups):
     keys = zip(flat.tolist(), starts, readings.end, strict=True)
     value = np.array([values.get((readings.table, *key), 0.0) for key in keys])
     if KINDS[readings.table].has("instrument"):
-        names = [setups[one].instrument for one in readings.setup] or readings.instrument
-        value = np.array([_read(one, name, *tools) for one, name in zip(value, names, strict=True)])
+        names = [setups[setup].instrument for setup in readings.setup] or readings.instrument
+        value = np.array(
+            [_read(setup, name, *tools) for setup, name in zip(value, names, strict=True)]
+        )
     elif readings.table == "plumb_lines":
         return readings
     return replace(readings, value=draw(value, readings.sd))
