@@ -1,16 +1,16 @@
-"""A former table on the basis of a new one: zero, temperature, head, roof, rounding, in this order.
+"""Bring a former table to the basis of a new table: zero, temperature, head, roof, rounding.
 
-Each step starts from what those before it gave, so that together with what is left they add up to
-the difference of the tables:
+Each step starts from the result of the steps before it. The steps and the remaining difference
+therefore add up to the difference of the tables:
 
     zero         V(h + h0), h0 the height of the new zero above the former one
-    temperature  areas carry (1 + a (T_new - T_old))^2; of a tank that is one solid, and where dips
-                 expand too, V s^3 at the dip h / s, s = 1 + a (T_new - T_old)
-    head         of the new density less that of the former, in the rings of the former table
-    roof         what it displaces, of the former table less of the new one
+    temperature  areas are multiplied by (1 + a (T_new - T_old))^2; for a tank that is one solid, or
+                 whose dips also expand, V s^3 at the dip h / s, s = 1 + a (T_new - T_old)
+    head         head of the new density minus head of the former, in the rings of the former table
+    roof         displacement in the former table minus displacement in the new table
     rounding     to the last digit of the new table
 
-A step whose values are not known is not made, and its state says what is lacking.
+A step with unknown values is omitted; its state lists the missing values.
 """
 
 from dataclasses import dataclass, replace
@@ -25,23 +25,25 @@ from tankcal.recalibration.upright_shell import Rings
 from tankcal.record.comparison import BasisStep, ZeroShift
 from tankcal.tank.fittings import floating_roof
 
-ROUNDS = 5  # of the zero: each leaves a hundredth of the last, or less
-SAME_ZERO_M = 1e-7
-FEWEST_ROWS = 2
-SPARE = 1.1  # of a smooth curve: it bends a little more between rows than at them
-NOTICED, LEAST_ZERO_M = 2.0, 1e-4  # standard uncertainties, and size: a zero below either is none
+ROUNDS = 5  # iterations of the zero; each reduces the error to a hundredth or less
+SAME_ZERO_M = 1e-7  # convergence limit of the zero
+FEWEST_ROWS = 2  # fewest common rows of both tables
+SPARE = 1.1  # margin: a smooth curve may bend more between rows than at rows
+# Smallest fitted zero that counts: in standard uncertainties, and in metres.
+NOTICED, LEAST_ZERO_M = 2.0, 1e-4
 UNITS = {"zero": "m", "temperature": "C", "head": "kg/m3", "roof": "m3", "rounding": "m3"}
 
 
 @dataclass(frozen=True)
 class Step:
-    """One step.
+    """One step from the former basis to the new basis.
 
     Attributes
     ----------
     added_m3 : (rows,) ndarray
+        Change of the former volumes.
     state, source, former, new, lacking
-        As of `record.comparison.BasisStep`.
+        As in `record.comparison.BasisStep`.
     """
 
     added_m3: np.ndarray
@@ -54,25 +56,25 @@ class Step:
 
 @dataclass(frozen=True)
 class OneBasis:
-    """Rows of a new table, and what the former one says of them on its basis.
+    """Rows of a new table, and the former table on the basis of the new one.
 
     Attributes
     ----------
     height_m : (rows,) ndarray
-        Dips of the new table in the range of both.
+        Dips of the new table within the range of both.
     rows : (rows,) ndarray of int
-        Which rows of the new table they are.
+        Row numbers in the new table.
     former_m3, on_basis_m3, new_m3 : (rows,) ndarray
-        The former table as printed; on the basis of the new one; the new one.
+        Former table as printed; former table on the new basis; new table.
     steps : dict
-        {name: Step}, in their order.
+        {name: Step}, in order.
     zero : ZeroShift
     for_use : (rows,) ndarray of bool
         False where a roof is partly afloat.
     interpolation_m3 : float
-        Largest error of what was interpolated in the former table.
+        Largest interpolation error in the former table.
     densities : (Density, Density)
-        Of the former and the new table.
+        Former and new table.
     """
 
     height_m: np.ndarray
@@ -88,12 +90,12 @@ class OneBasis:
 
     @property
     def saved_steps(self):
-        """The `BasisStep` of each."""
+        """Return the `BasisStep` of each step."""
         return [_saved(name, one, self.height_m) for name, one in self.steps.items()]
 
 
 def bring_to_one_basis(former, new, facts):
-    """`OneBasis` of two FormerTables of a tank.
+    """Return the `OneBasis` of two FormerTables of a tank.
 
     Parameters
     ----------
@@ -107,7 +109,7 @@ def bring_to_one_basis(former, new, facts):
     Raises
     ------
     InputError
-        When the tables have no two rows in common.
+        If the tables have fewer than two rows in common.
     """
     zero = _declared_zero(former, new)
     densities = densities_of(former, new, facts)
@@ -134,9 +136,9 @@ def bring_to_one_basis(former, new, facts):
 
 
 def rows_in_both(former, new, zero_m):
-    """Indices of the rows of the new table that the former one has, with and without a zero.
+    """Indices of the new rows within the range of the former table, with and without a zero.
 
-    Raises InputError where there are not two of them.
+    Raises InputError if there are fewer than two.
     """
     low, high = former.height_m[0] - 1e-9, former.height_m[-1] + 1e-9
     dips = new.height_m
@@ -158,16 +160,16 @@ def rows_in_both(former, new, zero_m):
 
 
 def volume_at(table, dips_m):
-    """(n,) volumes of a table, linear between its rows as a gauge reads them."""
+    """Volumes (n,) of a table at dips, by linear interpolation as in a gauge, m3."""
     return np.interp(dips_m, table.height_m, table.volume_m3)
 
 
 def interpolation_error_m3(table, dips_m):
-    """A bound of the error of `volume_at`, by how far rows leave the chord of their neighbours.
+    """Bound of the error of `volume_at`, from distances of rows to chords of their neighbours.
 
-    Rows that stand in the table have none; what one digit explains is none. Of a smooth curve a row
-    leaves the chord by V'' s^2 / 2, the middle between rows by a fourth of that. A kink between two
-    rows makes them leave their chords by p and q, and the error at it is 2 p q / (p + q).
+    The error is 0 at rows of the table; distances within one digit are ignored. On a smooth curve,
+    a row is V'' s^2 / 2 off the chord, and the middle between rows a fourth of it. A kink between
+    two rows moves them off their chords by p and q; the error at the kink is 2 p q / (p + q).
     """
     heights, volumes = table.height_m, table.volume_m3
     if len(heights) < 3:
@@ -175,7 +177,7 @@ def interpolation_error_m3(table, dips_m):
     part = np.diff(heights)[:-1] / (heights[2:] - heights[:-2])
     chord = volumes[:-2] + part * (volumes[2:] - volumes[:-2])
     off = np.maximum(np.abs(volumes[1:-1] - chord) - table.volume_quantum_m3, 0.0)
-    off = np.pad(off, 2, mode="edge")  # of rows from the one below the first to that above the last
+    off = np.pad(off, 2, mode="edge")  # from the row below the first to the row above the last
     four = np.array([off[k : len(off) - 3 + k] for k in range(4)])
     smooth = four.min(axis=0)
     one, two = four[1] - smooth, four[2] - smooth
@@ -196,7 +198,7 @@ def _declared_zero(former, new):
 
 
 def _fitted_zero(former, new, facts, densities):
-    """(height of the new zero above the former one, its u) by the volumes; None: they are mum."""
+    """Fit the height of the new zero above the former one to the volumes: (height, u), or None."""
     zero, found = 0.0, None
     quanta = np.hypot(former.volume_quantum_m3, new.volume_quantum_m3) / np.sqrt(12)
     for _ in range(ROUNDS):
@@ -250,7 +252,10 @@ def _zero_step(step, shift, former, new):
 
 
 def _steps(former, new, facts, densities, zero, rows, until="rounding"):
-    """({name: Step}, former volumes as printed, on the new basis) in rows of the new table."""
+    """Return {name.
+
+    Step}, and the former volumes as printed and on the new basis, at dips of new rows.
+    """
     dips = new.height_m[rows]
     before = volume_at(former, dips)
     basis = volume_at(former, dips + zero)
@@ -320,15 +325,16 @@ def _head(former, new, facts, densities, zero, dips, basis):
 
 
 def radii_of_rows(rings, dips, volumes, density, zone=None):
-    """(courses,) unloaded radii of the rings by what volumes rise within them.
+    """Unloaded radii (courses,) of the rings, from the rise of the volumes within them, m.
 
-    A ring that no two rows reach gets that of the next one below. Over the critical zone of a roof
-    (dips from and to) the rows rise by less than the ring holds: it counts on one side of it.
+    A ring between two rows takes the radius of the next ring below. Over the critical zone of a
+    roof (`zone`: its lower and upper dip), the rows rise by less than the ring holds. The ring is
+    then evaluated on one side of the zone.
     """
     radii, edges = np.empty(len(rings.thickness_m)), rings.edges_m.copy()
     edges[-1] = max(edges[-1], dips[-1])
     head = np.zeros(len(dips))
-    for _ in range(2):  # once without, once with the head that these radii have
+    for _ in range(2):  # first without, then with the head in rings of these radii
         for k in range(len(radii)):
             inside = np.flatnonzero((dips >= edges[k] - 1e-9) & (dips <= edges[k + 1] + 1e-9))
             inside = inside[len(inside) // 2 :] if k == 0 and len(inside) > 5 else inside
@@ -343,7 +349,7 @@ def radii_of_rows(rings, dips, volumes, density, zone=None):
 
 
 def _beside(zone, inside, dips):
-    """Those rows (indices) that lie on one side of a critical zone, the side of more rows."""
+    """Indices of the rows on one side of a critical zone, the side with more rows."""
     if zone is None:
         return inside
     above = inside[dips[inside] >= zone[1] - 1e-9]

@@ -1,4 +1,4 @@
-"""`tankcal compare`: a former table and a new one of the same tank, on one basis and judged."""
+"""`tankcal compare`: compare a former and a new table of one tank on a common basis."""
 
 from dataclasses import dataclass
 
@@ -43,19 +43,19 @@ from tankcal.record.comparison import (
 from tankcal.record.schema import filled_from
 from tankcal.record.texts import warnings_of
 
-MINIMUM_M = (1.5, 2.0, 3.0)  # of deliveries
+MINIMUM_M = (1.5, 2.0, 3.0)  # smallest heights of deliveries
 DEFAULT_RULE = "france_2020_recalibration"
-JUDGED_PART = 0.1  # of the range, above which rows of a low tank are judged
-MOST_APART = 0.2  # of a volume, by which tables of one tank may differ
-PARTS_OF_HEIGHT = (0.2, 0.4, 0.6, 0.8, 1.0)  # of the waterfall
-ZERO_APART = 3.0  # standard uncertainties of a fitted zero that differs from a declared one
-LEAST_ZERO_M = 1e-3
-BEFORE_ZERO = ("temperature", "head", "roof")  # what is not taken off goes into a fitted zero
+JUDGED_PART = 0.1  # share of the range above which rows of a low tank are judged
+MOST_APART = 0.2  # largest relative difference of volumes of one tank
+PARTS_OF_HEIGHT = (0.2, 0.4, 0.6, 0.8, 1.0)  # relative heights of the rows of the waterfall
+ZERO_APART = 3.0  # significant difference of fitted and declared zero, standard uncertainties
+LEAST_ZERO_M = 1e-3  # smallest reported difference of zeros
+BEFORE_ZERO = ("temperature", "head", "roof")  # steps that bias a fitted zero if omitted
 
 
 @dataclass(frozen=True)
 class _Agreement:
-    """What E_n is made of."""
+    """Uncertainties and correlation from which E_n is computed."""
 
     c: float | None
     former_U: object
@@ -69,17 +69,17 @@ class _Agreement:
 
 
 def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
-    """Compare a former table with a new one of the same tank.
+    """Compare a former table with a new table of one tank.
 
     Parameters
     ----------
     former, new : FormerTable
-        See `recalibration.reading.read_former`. `common` of either of them is the correlation of
+        See `recalibration.reading.read_former`. `common` of either table is the correlation of
         their errors.
     rule : (Rule, file name), optional
-        That the new table is judged by; None: the French rule of 2020.
+        Rule by which the new table is judged; None: the French rule of 2020.
     courses : (heights, thicknesses), optional
-        Of an upright tank, m: (n,) each, where neither table is a record that has them.
+        Courses of an upright tank, m, (n,) each, if neither table is a record with courses.
     fingerprints : (str, str)
         SHA-256 of both files.
 
@@ -90,8 +90,8 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
     Raises
     ------
     InputError
-        For tables of other kinds of tank, without a common range, or whose volumes are so
-        different that they are not of one tank, or of one unit.
+        For tables of different kinds of tank, without a common range, or with volumes too different
+        for one tank or one unit.
 
     Examples
     --------
@@ -100,8 +100,8 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
     >>> dips = np.linspace(0.0, 8.0, 81)
     >>> former = FormerTable("old.csv", dips, 100 * dips, U_m3=0.2 * dips, common=0.0)
     >>> new = FormerTable("new.csv", dips, 100.05 * dips, U_m3=0.15 * dips)
-    >>> found = compare(former, new)
-    >>> found.verdict, round(float(found.rows.d_m3[-1]), 3), round(float(found.rows.E_n[-1]), 2)
+    >>> result = compare(former, new)
+    >>> result.verdict, round(float(result.rows.d_m3[-1]), 3), round(float(result.rows.E_n[-1]), 2)
     ('keep', 0.4, 0.2)
     """
     c = _common(former, new)
@@ -149,11 +149,11 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
     )
 
 
-# ---- what cannot be compared
+# ---- tables that cannot be compared
 
 
 def _common(former, new):
-    """The declared correlation, or None."""
+    """Declared correlation of the tables, or None."""
     one, two = former.common, new.common
     if one is not None and two is not None and one != two:
         expected = message(
@@ -254,7 +254,7 @@ def _delivery(basis, minimum, by, one):
 
 
 def _worst(basis, agreement, deliveries):
-    """(lowest dip whose row is judged, WorstError or None) of rows and deliveries."""
+    """Return the lowest judged dip, and the WorstError or None of rows and deliveries."""
     dips = basis.height_m
     reach = dips[-1] - dips[0]
     from_m = float(dips[0] + (MINIMUM_M[0] if reach > 2 * MINIMUM_M[0] else JUDGED_PART * reach))
@@ -279,7 +279,7 @@ def _worst(basis, agreement, deliveries):
     )  # fmt: skip
 
 
-# ---- what is saved
+# ---- content of the file
 
 
 def _correlation(agreement, worst):
@@ -309,7 +309,7 @@ def _rows(basis, agreement):
 
 
 def _waterfall(basis):
-    """Rows at parts of the range: those for use that are nearest."""
+    """Return rows at given parts of the range, each the nearest row for use."""
     use = np.flatnonzero(basis.for_use)
     dips = basis.height_m[use]
     at = [dips[0] + part * (dips[-1] - dips[0]) for part in PARTS_OF_HEIGHT]
@@ -351,14 +351,14 @@ def _tank_id(former, new):
 
 
 def _notice(former, new):
-    """The notice on the papers of the new table, else of the former one; "" for none."""
+    """Notice in the report of the new table, else of the former table; "" if none."""
     records = [table.record for table in (new, former) if table.record is not None]
     notices = [str(one["job"]["certificate"].get("notice") or "") for one in records]
     return next(filter(None, notices), "")
 
 
 def _read(former, new, basis):
-    """What was read out of the tables because nobody declared it."""
+    """Return the values that were estimated from the tables because they are not declared."""
     found = []
     for name, one in zip(("former", "new"), basis.densities, strict=True):
         if one.head is not None:
@@ -383,7 +383,7 @@ def _read(former, new, basis):
 
 
 def _warnings(former, new, basis):
-    """Problems that deserve a look: of both tables, and of their zeros."""
+    """Return the warnings of both tables and of their zeros."""
     found = [*former.warnings, *new.warnings]
     if former.date and new.date and str(former.date)[:10] > str(new.date)[:10]:
         text = message(

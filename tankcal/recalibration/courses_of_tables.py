@@ -1,4 +1,4 @@
-"""How the radius of each course differs between two tables that are on one basis."""
+"""Difference of the radius of each course between two tables on a common basis."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from tankcal.record.comparison import ComparedCourse
 
 
 def compared_courses(facts, basis, former_U, new_U, c, sd_m3):
-    """The `ComparedCourse` of each course that the rows reach; none where they are not known.
+    """Return the `ComparedCourse` of each course within the rows; none if the courses are unknown.
 
     Parameters
     ----------
@@ -19,7 +19,7 @@ def compared_courses(facts, basis, former_U, new_U, c, sd_m3):
     c : float
         Correlation of the errors of both tables.
     sd_m3 : float
-        Of a difference of rows, by rounding.
+        Standard deviation of a difference of rows, by rounding.
     """
     if not facts.is_shell:
         return []
@@ -53,7 +53,7 @@ def compared_courses(facts, basis, former_U, new_U, c, sd_m3):
 
 
 def _radii(facts, basis):
-    """(courses,) radii in the new table: of its record, else by what its rows rise."""
+    """Radii (courses,) in the new table: from its record, else from the rise of its rows."""
     if facts.inside_m is not None:
         return facts.inside_m
     rings = Rings(facts.edges_m(), facts.thickness_m, facts.modulus_pa, is_first_order=False)
@@ -66,7 +66,9 @@ def _radii(facts, basis):
 
 
 def _u_of_tables(basis, tables, ends, radius):
-    """Standard uncertainty of a radius by the volume of its course in each table; None: unknown.
+    """Standard uncertainty of a radius from the volume of its course in each table.
+
+    None if unknown.
 
     u(r) = r u(V) / (2 V), V between the lowest and the highest row within the course.
     """
@@ -81,5 +83,5 @@ def _u_of_tables(basis, tables, ends, radius):
 
 
 def _u_of_change(former, new, c):
-    """Standard uncertainty of the difference of two radii, c being the correlation."""
+    """Standard uncertainty of the difference of two radii with correlation c."""
     return float(np.sqrt(max(former**2 + new**2 - 2 * c * former * new, 0.0)))

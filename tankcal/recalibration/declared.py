@@ -1,4 +1,4 @@
-"""former.toml: what is known of a former table beside its rows, and the checks of it."""
+"""former.toml: declared facts about a former table, and their checks."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -58,12 +58,17 @@ UNCERTAINTIES = ("U_m3", "U_percent", "u_m3", "u_percent")
 
 @dataclass(frozen=True)
 class Declared:
-    """What former.toml says.
+    """Content of a former.toml.
 
-    name    of the file
-    values  {key of [former]: value or None}
-    rows    {key: row of the file}
-    roof    FormerRoof or None
+    Attributes
+    ----------
+    name : str
+        Name of the file.
+    values : dict
+        {key of [former]: value or None}.
+    rows : dict
+        {key: row of the file}.
+    roof : FormerRoof or None
     """
 
     name: str = "former.toml"
@@ -76,7 +81,7 @@ class Declared:
 
     @property
     def units(self):
-        """Units of columns whose headings name none."""
+        """Units of columns whose headings name no unit."""
         height, volume = self["height_unit"], self["volume_unit"]
         if height is None and volume is None:
             return NO_UNITS
@@ -84,19 +89,19 @@ class Declared:
 
     @property
     def uncertainty(self):
-        """(key, value) of the uncertainty that is declared, or None."""
+        """(key, value) of the declared uncertainty, or None."""
         given = [key for key in UNCERTAINTIES if self[key] is not None]
         return (given[0], self[given[0]]) if given else None
 
     def tell(self, log, key, expected):
-        """Note a problem of one key."""
+        """Report a problem of one key."""
         log.problem(self.name, expected, self.rows.get(key), f"former.{key}")
 
 
 def read_declared(path, log):
-    """`Declared` of a former.toml (a Path); what is wrong with it goes to `log`.
+    """Return the `Declared` of a former.toml (a Path); report its problems to `log`.
 
-    Keys that are wrong count as not given, so that the table is judged in the same run.
+    Invalid keys count as not stated, so that the table is examined in the same run.
     """
     path = Path(path)
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
@@ -120,7 +125,7 @@ def read_declared(path, log):
 
 
 def _check(found, log):
-    """Uncertainties said once, U with its factor; a density that is one."""
+    """Check that the uncertainty is stated once, with a factor for U, and check the density."""
     given = [key for key in UNCERTAINTIES if found[key] is not None]
     for key in given[1:]:
         expected = message(
@@ -143,7 +148,7 @@ def _check(found, log):
 
 
 def _roof(file, given, row, log):
-    """FormerRoof of [roof], or None after telling what is wrong or missing."""
+    """Return the FormerRoof of [roof]; None after reporting invalid or missing keys."""
     if given is None:
         return None
     told = len(log.problems)

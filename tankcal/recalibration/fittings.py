@@ -1,9 +1,9 @@
-"""Things in a tank, and a floating roof, that a table shows: where the area of the cut jumps.
+"""Deadwood and floating roofs in a table: heights where the area of the cross section jumps.
 
-A thing of volume v between the dips b and t changes the volume below h by v clip((h - b)/(t - b)):
-two kinks, at b and t. What stands in the tank has a negative v. Which pair of kinks explains most
-of what an adjustment leaves is found for all pairs at once: with ramps R_p = max(h - p, 0) and the
-projector P of the adjustment, a thing between b and t lowers chi2 by
+A fitting of volume v between the dips b and t changes the volume below h by v clip((h - b)/(t -
+b)): two kinks, at b and t. Deadwood has a negative v. All pairs of kinks are tested together for
+the pair that best explains the residuals of an adjustment. With ramps R_p = max(h - p, 0) and the
+projector P of the adjustment, a fitting between b and t lowers chi2 by
 
     [(R_b - R_t)' r]^2 / [(R_b - R_t)' P (R_b - R_t)]
 """
@@ -12,22 +12,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-ROUNDING = 1e-11  # of a ramp, that is left when the adjustment takes it up
-GIVING = 0.5  # what gives room is rarer, and looks like the gap between two things that take it
-APART = 3  # places, of candidates
-MOST_PLACES = 300  # of kinks that are tried; a finer table is tried at some of its rows
+ROUNDING = 1e-11  # relative remainder of a ramp that the adjustment absorbs
+GIVING = 0.5  # weight of fittings that add volume: rarer, and similar to a gap between two others
+APART = 3  # smallest distance of candidates, in candidate places
+MOST_PLACES = 300  # largest number of places tested for kinks; finer tables are thinned
 
 
 @dataclass(frozen=True)
 class Fitting:
-    """One thing that takes or gives room.
+    """A fitting that reduces or increases the volume.
 
     Attributes
     ----------
     bottom_m, top_m : float
         Dips.
     volume_m3 : float
-        Negative: it takes room.
+        Negative: deadwood.
     """
 
     bottom_m: float
@@ -35,16 +35,16 @@ class Fitting:
     volume_m3: float
 
     def volume_below_m3(self, dips_m):
-        """(rows,) what it changes of the volume below each dip."""
+        """Change of the volume below each dip, shape (rows,), m3."""
         return self.volume_m3 * self.share(dips_m)
 
     def share(self, dips_m):
-        """(rows,) part of it that is below each dip."""
+        """Share of the fitting below each dip, shape (rows,)."""
         height = max(self.top_m - self.bottom_m, 1e-9)
         return np.clip((np.asarray(dips_m) - self.bottom_m) / height, 0.0, 1.0)
 
     def derivatives(self, dips_m):
-        """(rows, 3) derivatives of `volume_below_m3` by bottom, top and volume."""
+        """Derivatives (rows, 3) of `volume_below_m3` by bottom, top and volume."""
         dips = np.asarray(dips_m)
         height = max(self.top_m - self.bottom_m, 1e-9)
         share = self.share(dips)
@@ -54,22 +54,22 @@ class Fitting:
 
 
 def find_fittings(dips_m, left_m3, design, sd_m3, longest_m=np.inf, most=4):
-    """Each `Fitting` that explains much of what an adjustment leaves, and by how much chi2 falls.
+    """Return each `Fitting` that explains residuals of an adjustment, with its reduction of chi2.
 
     Parameters
     ----------
     dips_m : (rows,) ndarray
-        Rising.
+        Rising dips.
     left_m3 : (rows,) ndarray
-        Volume of the table less that of the adjustment.
+        Residuals: volume of the table minus that of the adjustment.
     design : (rows, u) ndarray
         Derivatives of the adjustment by its unknowns.
     sd_m3 : (rows,) ndarray
         Standard deviations of the rows.
     longest_m : float, optional
-        Longer ones are not looked for.
+        Largest height of a fitting.
     most : int
-        Of them, the best first, each well apart from the others.
+        Largest number of fittings, best first, well apart from each other.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def find_fittings(dips_m, left_m3, design, sd_m3, longest_m=np.inf, most=4):
 
 
 def _standing(gain, low, high, slope):
-    """Of the two things that one kink may be the end of, the one that takes room."""
+    """Of the two fittings that may end at one kink, return the one that reduces the volume."""
     last = len(gain) - 1
     if slope > 0:
         for pair in ((0, low), (high, last)):
@@ -118,10 +118,10 @@ def _standing(gain, low, high, slope):
 
 
 def in_other_pairs(fittings, near_m, least_share):
-    """The same kinks as other things: one above the other where they overlapped.
+    """Pair the kinks differently: fittings one above the other instead of overlapping ones.
 
-    Kinks nearer than `near_m` are one; those of less than a share of the largest change of slope
-    are none.
+    Kinks nearer than `near_m` are merged. Kinks below a share of the largest change of slope are
+    ignored.
     """
     kinks = []
     for one in fittings:

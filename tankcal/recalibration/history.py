@@ -1,8 +1,8 @@
-"""The tables of one tank over the years: volumes and radii on one basis, what changed when.
+"""History of the tables of one tank: volumes and radii on one basis, and changes between tables.
 
 Every table is compared with the newest one (`recalibration.comparison.compare`), which brings it
-to that basis; and each with the one before it, which says what changed between them. Nothing is
-computed here that a comparison does not say.
+to the newest basis. Each table is also compared with the one before it, which shows the changes
+between them. All results are results of these comparisons.
 """
 
 from dataclasses import dataclass
@@ -33,14 +33,14 @@ MOST_WARNINGS = 100
 
 @dataclass(frozen=True)
 class DatedTable:
-    """A capacity table of a tank, with its day.
+    """A capacity table of a tank, with its date.
 
     Attributes
     ----------
     table : FormerTable
-        Its name is where it was found.
+        Its name is its location.
     sha256 : str
-        Of its file.
+        SHA-256 of its file.
     day : date
     """
 
@@ -50,7 +50,7 @@ class DatedTable:
 
     @property
     def tank(self):
-        """Id of the tank in the record; None where there is none."""
+        """Id of the tank in the record; None without a record."""
         record = self.table.record
         return None if record is None else record["job"]["tank"].get("id")
 
@@ -58,19 +58,19 @@ class DatedTable:
 def history_of(
     tables, inspections=(), *, dips_m=None, courses=None, left_out=(), warnings=(), progress=None
 ):
-    """The history of a tank.
+    """Return the history of a tank.
 
     Parameters
     ----------
     tables : sequence of DatedTable
-        In any order, at least one.
+        At least one table, in any order.
     inspections : sequence of InspectionInHistory
     dips_m : sequence of float, optional
-        That volumes are shown at; None: at fifths of the range that all tables have.
+        Dips of the volumes shown; None: fifths of the common range of all tables.
     courses : (heights, thicknesses), optional
-        Of an upright tank, m, where no record has them.
+        Courses of an upright tank, m, if no record has them.
     left_out, warnings : sequence of Problem
-        Of finding and reading the files.
+        Problems met while files were searched and read.
     progress : callable, optional
         progress(text, done, total)
 
@@ -81,7 +81,7 @@ def history_of(
     Raises
     ------
     InputError
-        With every pair of tables that cannot be of one tank, and every dip that no table has.
+        With every pair of tables that cannot be of one tank, and every dip outside all tables.
 
     Examples
     --------
@@ -90,8 +90,8 @@ def history_of(
     >>> def table(year, area):
     ...     rows = FormerTable(f"{year}.csv", dips, area * dips, U_m3=0.2 * dips)
     ...     return DatedTable(rows, "", date(year, 5, 1))
-    >>> found = history_of([table(2020, 100.05), table(2010, 100.0)])
-    >>> [one.date for one in found.certificates], round(found.changes[0].top_d_m3, 3)
+    >>> history = history_of([table(2020, 100.05), table(2010, 100.0)])
+    >>> [entry.date for entry in history.certificates], round(history.changes[0].top_d_m3, 3)
     (['2010-05-01', '2020-05-01'], 0.4)
     """
     ordered = sorted(tables, key=_order)
@@ -127,19 +127,19 @@ def history_of(
 
 
 def _order(one):
-    """By day; of one day by number, program and file: the order is the same on every machine."""
+    """Sort key: date, then number, program and file, so that the order is reproducible."""
     record = one.table.record or {}
     return one.day, str(one.table.number or ""), record.get("tankcal") or "", one.table.name
 
 
 def _with_u(ordered):
-    """The newest table with U, else the newest one."""
+    """Newest table with U, else the newest table."""
     known = [one.table for one in ordered if one.table.U_m3 is not None]
     return known[-1] if known else ordered[-1].table
 
 
 def _comparisons(ordered, courses, progress):
-    """(each with the newest, each with the one before): lists of ComparisonFile."""
+    """Compare each table with the newest, and with the one before: two lists of ComparisonFile."""
     newest, problems, found = ordered[-1].table, {}, ([], [])
     pairs = [(0, one.table, newest) for one in ordered]
     pairs += [(1, a.table, b.table) for a, b in pairwise(ordered)]
@@ -156,7 +156,7 @@ def _comparisons(ordered, courses, progress):
 
 
 def _warnings(told, comparisons):
-    """Problems, then what the comparisons warn of, each once; WarningRecords."""
+    """Return problems and warnings of the comparisons as WarningRecords, without duplicates."""
     found = warnings_of(told)
     for one in comparisons:
         found += [warning for warning in one.warnings if warning.code != "compare_dates_turned"]
@@ -168,7 +168,7 @@ def _notice(table):
     return str(certificate.get("notice") or "")
 
 
-# ---- what is saved
+# ---- content of the file
 
 
 def _certificates(ordered):
@@ -212,7 +212,7 @@ def _certificates(ordered):
 
 
 def _shown_rows(on_newest, dips_m):
-    """Dips of the newest table, for use in all comparisons, that volumes are shown at."""
+    """Dips of the newest table, for use in all comparisons, at which volumes are shown."""
     common = None
     for one in on_newest:
         use = set(np.asarray(one.rows.height_m)[np.asarray(one.rows.for_use)].tolist())

@@ -1,4 +1,4 @@
-"""What deserves a look among the tables of one tank: days, names, sizes, zeros."""
+"""Checks of the tables of one tank: dates, tank names, dimensions, zeros."""
 
 from itertools import pairwise
 
@@ -7,11 +7,11 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.messages import message
 
-SAME_M = 1e-3  # of sizes and reference heights
+SAME_M = 1e-3  # largest difference of equal dimensions and reference heights
 
 
 def warnings_of_tables(ordered):
-    """Problems of tables (DatedTable, the oldest first), each with the one before it.
+    """Compare each table (DatedTable, oldest first) with the one before it; return Problems.
 
     Examples
     --------
@@ -22,7 +22,7 @@ def warnings_of_tables(ordered):
     ...     DatedTable(FormerTable("a.csv", [0, 1], [0, 1], reference_height_m=x), "", date.min)
     ...     for x in (9.1, 9.2)
     ... ]
-    >>> [one.expected.code for one in warnings_of_tables(tables)]
+    >>> [problem.expected.code for problem in warnings_of_tables(tables)]
     ['history_same_day', 'history_reference_height']
     """
     found = []
@@ -84,7 +84,7 @@ def _zero(one):
 
 
 def _sizes(name, other, was, now):
-    """Other nominal sizes, or other courses."""
+    """Report changed nominal dimensions or courses."""
     for key in ("nominal_diameter_m", "nominal_height_m"):
         sizes = [(job.get("tank") or {}).get(key) for job in (was, now)]
         if None not in sizes and abs(sizes[1] - sizes[0]) > SAME_M:

@@ -1,4 +1,4 @@
-"""What `tankcal history` is given: folders that hold results, saved files, former tables."""
+"""Input of `tankcal history`: folders of results, saved files, former tables."""
 
 import hashlib
 import json
@@ -20,25 +20,25 @@ from tankcal.record.inspection import INSPECTION, VERDICTS
 from tankcal.text.decoding import decode_text, find_encoding
 
 RECORD = "record.json"
-MOST_NAMED = 10  # tanks, in a message
+MOST_NAMED = 10  # largest number of tanks listed in a message
 TABLES = (".csv", ".xlsx", ".pdf", ".toml")
 
 
 @dataclass
 class Found:
-    """What lies in an archive.
+    """Content of an archive.
 
     Attributes
     ----------
     tables : list of DatedTable
     inspections : list of InspectionInHistory
     left_out : list of Problem
-        Files that no history can show, and why.
+        Files that cannot be part of a history, with the reason.
     warnings : list of Problem
     problems : list of Problem
-        Of files that cannot be read.
+        Unreadable files.
     ids : dict
-        {id of a tank: how many files are of it}.
+        {id of a tank: number of its files}.
     """
 
     tables: list = field(default_factory=list)
@@ -50,19 +50,21 @@ class Found:
 
 
 def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=None):
-    """The history of the tank whose results lie in folders.
+    """Return the history of the tank whose results are in the given folders.
 
     Parameters
     ----------
     paths : sequence of path
-        Folders, searched below for record.json and inspection.json; such files themselves; former
-        tables in any form that `read_former` reads, a former.toml with their date.
+        Folders, searched for record.json and inspection.json; such files; former tables in any form
+        that `read_former` reads, with a former.toml that states their date.
     tanks : sequence of str
-        Ids of the tank; files of others are passed over. None: all files must be of one tank.
+        Ids of the tank; files of other tanks are skipped. Empty: all files must be of one tank.
+    dips_m : sequence of float, optional
+        As in `history_of`.
     courses : path, optional
-        courses.csv of an upright tank, where no record has its courses.
-    dips_m, progress : optional
-        As of `history_of`.
+        courses.csv of an upright tank, if no record has its courses.
+    progress : callable, optional
+        As in `history_of`.
 
     Returns
     -------
@@ -71,8 +73,8 @@ def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=Non
     Raises
     ------
     InputError
-        With every file that cannot be read, for several tanks where none was asked for, and for
-        tables that cannot be of one tank.
+        With every unreadable file; for several tanks without `tanks`; and for tables that cannot be
+        of one tank.
     """
     found = Found()
     files = find_files(paths, progress)
@@ -107,10 +109,10 @@ def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=Non
 
 
 def find_files(paths, progress=None):
-    """[(path, name as it is shown, whether it was found in a folder)] of all that may count.
+    """Return [(path, name shown, whether found in a folder)] of all candidate files.
 
-    Folders are walked without following links to other folders, so that no loop is endless; hidden
-    folders are passed over.
+    Links to other folders are not followed, which excludes endless loops. Hidden folders are
+    skipped.
     """
     found, problems = [], []
     for given in map(Path, paths):
@@ -135,9 +137,9 @@ def find_files(paths, progress=None):
 
 
 def _named(found):
-    """(path, name, whether it was found in a folder): by as many folders as tell files apart.
+    """Return (path, name, whether found in a folder), named with enough folders to be unique.
 
-    found  (path, least number of parts of the name; 0: it was not found in a folder) of each
+    found: (path, fewest parts of the name, or 0 if not found in a folder) of each file.
     """
     places = {Path(os.path.abspath(path)).parts: least for path, least in reversed(found)}
     tails, named = {}, []
@@ -150,14 +152,14 @@ def _named(found):
 
 
 def _count_tails(places, count, known):
-    """How many places end in the same so many parts; `known` keeps what was counted."""
+    """Number of paths that end in these `count` parts; `known` caches the counts."""
     if count not in known:
         known[count] = Counter(parts[-count:] for parts in places)
     return known[count]
 
 
 def _below(folder, problems):
-    """Paths of the files below a folder that may count; folders that cannot be read are told."""
+    """Paths of candidate files below a folder; unreadable folders are reported."""
 
     def tell(error):
         text = message(
@@ -170,12 +172,12 @@ def _below(folder, problems):
     for place, folders, files in os.walk(folder, onerror=tell):
         folders[:] = sorted(one for one in folders if not one.startswith("."))
         for name in (RECORD, INSPECTION.file):
-            if name in files and Path(place, name).is_file():  # no pipe, no broken link
+            if name in files and Path(place, name).is_file():  # excludes pipes and broken links
                 yield Path(place, name)
 
 
 def _read(found, path, name, tanks, seen, is_sought):
-    """Put one file where it belongs."""
+    """Read one file and add it to the archive."""
     if path.suffix.lower() in TABLES:
         _take_former(found, path, name, seen)
         return
@@ -200,7 +202,7 @@ def _read(found, path, name, tanks, seen, is_sought):
 
 
 def _may_name(content, tank):
-    """Whether bytes hold the id of a tank as JSON writes it: quick, for archives of many tanks."""
+    """Whether bytes contain the id of a tank as JSON; a fast filter for large archives."""
     return any(
         json.dumps(tank, ensure_ascii=one).encode("utf-8", "replace") in content
         for one in (False, True)
@@ -227,7 +229,7 @@ def _unreadable(error, path):
 
 
 def _is_again(found, name, digest, seen):
-    """Whether the same file was read before; then a warning says so."""
+    """Whether the file was read before; then a warning is added."""
     if digest not in seen:
         seen[digest] = name
         return False
@@ -301,7 +303,7 @@ def _take_inspection(found, saved, name, digest, tanks, seen):
 
 
 def _worst_checks(checks):
-    """The worst figure of each check: by its verdict, then by value over limit."""
+    """Worst result of each check, by its verdict, then by value over limit."""
     worst = {}
     for one in checks:
         known = worst.get(one["code"])
@@ -321,7 +323,7 @@ def _worst_checks(checks):
 
 
 def _gravity(check):
-    """How grave a figure is: what could not be judged hides behind nothing that passed."""
+    """Rank of a result; a result that could not be judged ranks above one that passed."""
     value = abs(check["value"] or 0.0)
     limit = check["limit"] and check["limit"]["value"]
     return -VERDICTS.index(check["verdict"]), value / limit if limit else value
@@ -342,7 +344,7 @@ def _refuse_several(found, tanks, paths):
 
 
 def _nothing(found, tanks, paths):
-    """Why there is no table, with what was found in place of one."""
+    """Message that no table was found, with the files found instead."""
     name = Path(paths[0]).name or str(paths[0])
     text = message(
         "history_no_table",

@@ -1,4 +1,4 @@
-"""courses.csv beside a former table: rings whose heights may be unknown."""
+"""courses.csv of a former table: rings whose heights may be unknown."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,7 +24,7 @@ class Courses:
     file : str
     names : tuple of str
     heights_m : ndarray, shape (n,)
-        nan where it is not known.
+        nan if unknown.
     thickness_m : ndarray, shape (n,)
     """
 
@@ -34,7 +34,7 @@ class Courses:
     thickness_m: np.ndarray
 
     def first(self, count):
-        """The lowest of them."""
+        """Return the lowest `count` courses."""
         return replace(
             self,
             names=self.names[:count],
@@ -44,7 +44,7 @@ class Courses:
 
 
 def read_courses(path, log):
-    """`Courses` of a CSV file; None after telling `log` what is wrong with it."""
+    """Return the `Courses` of a CSV file; None after reporting its problems to `log`."""
     path = Path(path)
     if not path.exists():
         log.problem(path.name, message("read_no_file", "not found; expected a file of courses"))

@@ -1,4 +1,4 @@
-"""From a former table and its courses to what it says of its tank: the checks, and the dispatch."""
+"""Estimate the tank geometry from a former table and its courses: checks and dispatch."""
 
 from dataclasses import dataclass, replace
 
@@ -25,23 +25,24 @@ from tankcal.recalibration.upright_geometry import (
 
 FEWEST_ROWS = 8
 SOLIDS = "horizontal", "sphere"
-AS_GOOD, OTHER_PLACE_M = 1.05, 0.1  # of what is left; of seams that are not those declared
-LONG_M = 1.0  # of things in a tank
-ABOVE_M = 0.02  # that a table may go beyond its courses
-WORST_FIT = 5e-3  # of the highest volume, rms: rows that depart by more are of another tank
-LARGE_SHARE = 2e-3  # of the table, that a thing which may be a roof takes
+# Ratio of residuals of equally good fits, and smallest distance of a seam from a declared one.
+AS_GOOD, OTHER_PLACE_M = 1.05, 0.1
+LONG_M = 1.0  # height above which a fitting may be a misplaced seam
+ABOVE_M = 0.02  # largest height of a table above its courses
+WORST_FIT = 5e-3  # largest rms residual over the highest volume of a table of this tank
+LARGE_SHARE = 2e-3  # smallest share of the volume of a fitting that may be a roof
 
 
 @dataclass(frozen=True)
 class TableRead:
-    """What was read.
+    """Geometry estimated from a table.
 
     Attributes
     ----------
     former : FormerTable
     geometry : UprightGeometry, RecordedRadii, LyingGeometry or SolidFit
     names : tuple of str
-        Of the courses.
+        Names of the courses.
     job : JobOfTable
     warnings : tuple of Message
     """
@@ -131,7 +132,7 @@ def read_table(
 
 
 def _check_heights(former, courses):
-    """Refuse courses that have several seams of the table in them."""
+    """Refuse courses within which the table shows several seams."""
     heights = courses.heights_m
     if np.isnan(heights).any():
         return
@@ -152,7 +153,7 @@ def _check_heights(former, courses):
 
 
 def _read_computed(former, computed, courses, e_pa, bottom_m):
-    """TableRead of computed rows; None where each row may have been computed."""
+    """Return the TableRead of computed rows; None if each row may have been computed."""
     try:
         read = _read(former, computed.table(former), courses, e_pa, bottom_m)
     except TankcalError:
@@ -256,7 +257,7 @@ def _check_bottom(former, bottom_m, log):
 
 
 def _fitting(former, courses):
-    """(the courses that the table reaches, warnings, whether their seams are known)."""
+    """Return the courses within the table, warnings, and whether the seams are known."""
     heights = courses.heights_m
     unknown = np.isnan(heights)
     last = float(former.height_m[-1])
@@ -294,12 +295,12 @@ def _fitting(former, courses):
 
 
 def _slack(former):
-    """What the bottom of the first course may be above the zero."""
+    """Largest possible height of the bottom of the first course above the zero, m."""
     return 0.35 + ABOVE_M if former.height_m[0] == 0 else ABOVE_M
 
 
 def _with_seams(former, courses):
-    """The courses with heights by the seams that the table shows."""
+    """Return the courses with heights from the seams that the table shows."""
     count = len(courses.names)
     seams = find_seams(former.height_m, former.volume_m3, sd_of_rows(former), count - 1)
     if len(seams) < count - 1:
@@ -315,7 +316,7 @@ def _with_seams(former, courses):
 
 
 def _read(former, chosen, courses, e_pa, bottom_m):
-    """TableRead of a FormerTable by the rows that are chosen of it, a FormerTable as well."""
+    """Return the TableRead of a FormerTable from selected rows, given as a FormerTable."""
     courses, warnings, seams_known = _fitting(chosen, courses)
     found = read_upright(
         chosen,
@@ -336,10 +337,10 @@ def _read(former, chosen, courses, e_pa, bottom_m):
 
 
 def _other_seams(former, courses, found, e_pa, bottom_m):
-    """What to say where seams elsewhere explain by fewer things what those declared leave over."""
+    """Warn if other seams explain the residuals with fewer fittings than the declared seams."""
     declared = np.cumsum(found.heights_m)[:-1]
     doubtful = [one for one in found.fittings if _may_be_seams(one, declared + found.zero_m.value)]
-    is_bulged = found.state.bulges_m is not None  # profiles take up what seams elsewhere show
+    is_bulged = found.state.bulges_m is not None  # profiles absorb the effect of displaced seams
     is_doubtful = is_bulged or doubtful or found.roughness > 1
     if found.seams_are == "found" or not is_doubtful:
         return
@@ -352,7 +353,7 @@ def _other_seams(former, courses, found, e_pa, bottom_m):
             lowest_m=bottom_m,
             seams_known=False,
         )
-    except TankcalError:  # no such seams: those declared stand
+    except TankcalError:  # no solution with other seams: the declared seams are kept
         return
     seams = np.cumsum(other.heights_m)[:-1]
     is_simpler = len(other.fittings) < len(found.fittings) or found.roughness > other.roughness
@@ -371,13 +372,13 @@ def _other_seams(former, courses, found, e_pa, bottom_m):
 
 
 def _may_be_seams(thing, seams):
-    """Whether a thing is long, or ends at a declared seam: what seams elsewhere look like."""
+    """Whether a fitting is long or ends at a declared seam, so that it may be a displaced seam."""
     ends = np.array([thing.bottom_m.value, thing.top_m.value])
     return ends[1] - ends[0] > LONG_M or np.any(abs(ends[:, None] - seams) < OTHER_PLACE_M)
 
 
 def _u_common_m(former, found):
-    """Standard uncertainty of all radii together, by the U of the former table; 0: not known."""
+    """Common standard uncertainty of all radii, from U of the former table, m; 0 if unknown."""
     if former.U_m3 is None:
         return 0.0
     upper = former.height_m > 0.5 * former.height_m[-1]
@@ -392,7 +393,7 @@ def _tank_of(former):
 
 
 def _of_geometry(former, found, seams_known):
-    """What has to be known before the radii are used."""
+    """Messages about the geometry that the user must consider before using the radii."""
     if found.roughness > 1:
         yield message(
             "read_rough",
@@ -431,7 +432,7 @@ def _of_geometry(former, found, seams_known):
 
 
 def _of_density(declared, found):
-    """What the density of the head is compared with: those of liquids, and the declared one."""
+    """Compare the estimated density of the head with liquids and with the declared density."""
     density = found.density_kg_m3
     held = found.state.density_kg_m3
     if not is_possible(density):
@@ -468,7 +469,7 @@ def _of_density(declared, found):
 
 
 def _of_job(former, u_common):
-    """What the job lacks because nobody declared it."""
+    """Messages about values that the job lacks because they are not declared."""
     if former.record is None and u_common == 0:
         yield message(
             "read_no_U",

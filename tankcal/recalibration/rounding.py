@@ -1,22 +1,22 @@
-"""What the rounding of a table leaves uncertain of what is read out of it.
+"""Uncertainty by rounding of the quantities estimated from a table.
 
-As independent errors of q / sqrt(12), q the last digit, it is the covariance of the adjustment.
-But rounding is not independent from row to row: a ring of 1630.0448 L/cm has errors that climb by
-0.0448 L a row and fall back every 22 rows. So the table is rounded again at many places of its last
-digit, with the steps of tanks that it leaves possible, and what that does to the unknowns is the
-other measure; the larger one counts.
+As independent errors of q / sqrt(12), q the last digit, rounding gives the covariance of the
+adjustment. But rounding errors of successive rows are correlated: in a ring of 1630.0448 L/cm, the
+errors grow by 0.0448 L per row and fall back every 22 rows. The table is therefore rounded again at
+many offsets of its last digit, with the steps of possible tanks. The effect on the unknowns is a
+second estimate; the larger estimate is used.
 """
 
 import numpy as np
 
-ROUGH = 1.15  # rms over what rounding leaves: above it, rows have more in them than rounding
-DRAWS, SEED = 150, 21
+ROUGH = 1.15  # rms residual over rms rounding error; above it, rows contain other errors
+DRAWS, SEED = 150, 21  # number of simulated roundings, and seed
 
 
 def sd_of_rows(former):
-    """(rows,) standard deviations of a table's volumes by its last digits.
+    """Standard deviations (rows,) of a table's volumes by its last digits, m3.
 
-    Dips of an even step are what the table was made for; others were rounded, too.
+    Dips with even steps are exact; other dips contribute their own rounding.
     """
     dips, volumes = former.height_m, former.volume_m3
     finest = 1e-7 + 1e-12 * float(np.abs(volumes).max())
@@ -27,7 +27,7 @@ def sd_of_rows(former):
 
 
 def rounded_again(found, rows, quantum_m3, draws=DRAWS):
-    """(draws, rows) rounding errors of tanks that a Fit leaves possible, m3."""
+    """Rounding errors (draws, rows) of tanks compatible with a Fit, m3."""
     sds = np.sqrt(np.diag(found.cofactor))
     random = np.random.default_rng(SEED)
     safe = np.where(sds > 0, sds, 1.0)
@@ -40,14 +40,14 @@ def rounded_again(found, rows, quantum_m3, draws=DRAWS):
 
 
 def scale_of_u(found, rows, quantum_m3):
-    """(u,) what the standard deviations of the unknowns of a Fit are multiplied by; 1 or more.
+    """Factors (u,) of the standard deviations of the unknowns of a Fit, 1 or more.
 
     Parameters
     ----------
     found : Fit
     rows : Rows
     quantum_m3 : float
-        Value of the last printed digit; 0: nothing was rounded.
+        Value of the last printed digit; 0: not rounded.
     """
     return np.maximum(_by_steps(found, rows, quantum_m3), roughness(found, rows))
 
@@ -63,10 +63,10 @@ def _by_steps(found, rows, quantum):
 
 
 def roughness(found, rows):
-    """What u is multiplied by: 1, or more where rows depart by more than their rounding.
+    """Factor of u: 1, or more if the residuals exceed the rounding errors.
 
-    Departures that go on from row to row count for fewer rows than there are: with a correlation c
-    of neighbours by sqrt((1 + c) / (1 - c)).
+    Correlated residuals count as fewer rows: a correlation c of neighbours gives the factor
+    sqrt((1 + c) / (1 - c)).
     """
     left = found.left_m3 / rows.sd_m3
     size = np.sqrt(found.chi2 / found.dof) if found.dof > 0 else 1.0

@@ -1,8 +1,8 @@
-"""One adjustment of the rows of a table: rings, head, zero, seams, things in the tank.
+"""Adjustment of the rows of a table: rings, head, zero, seams, fittings.
 
-    V(h) = V_0 + W(h) - W(h_0) + sum over things of v share(h) + roof, if h is above its zone
+    V(h) = V_0 + W(h) - W(h_0) + sum over fittings of v share(h) + roof, if h is above its zone
 
-V_0 is the volume at the lowest row h_0 that is used. It is linear in all but the places of kinks.
+V_0 is the volume at the lowest row h_0 used. The model is linear except in the positions of kinks.
 """
 
 from dataclasses import dataclass, replace
@@ -15,15 +15,15 @@ from tankcal.recalibration.bulges import bulge_derivatives, bulge_volume_m3, pri
 from tankcal.recalibration.fittings import Fitting
 from tankcal.recalibration.upright_shell import Rings
 
-ZERO_SD_M, SEAM_SD_M, KINK_SD_M = 0.1, 0.05, 1.0  # so weak that a table decides; never singular
-BULGED_ZERO_SD_M = 0.03  # profiles hide the joints, by which a table shows its zero
+ZERO_SD_M, SEAM_SD_M, KINK_SD_M = 0.1, 0.05, 1.0  # weak priors, which prevent singularity
+BULGED_ZERO_SD_M = 0.03  # prior of the zero with profiles, which hide the joints
 DENSITY_SD_KG_M3 = 1e5
-MOST_ROUNDS, MOST_HALVINGS, SETTLED = 15, 6, 1e-3  # of chi2
+MOST_ROUNDS, MOST_HALVINGS, SETTLED = 15, 6, 1e-3  # iterations, halvings, final change of chi2
 
 
 @dataclass(frozen=True)
 class State:
-    """What a table is taken to be, with the values of its unknowns.
+    """Model of a table, with the values of its unknowns.
 
     Attributes
     ----------
@@ -34,24 +34,24 @@ class State:
     zero_m : float
         Dip of the bottom of the first ring.
     seams_m : ndarray, shape (n - 1,)
-        Heights of the seams above that.
+        Heights of the seams above the bottom of the first ring.
     rings_top_m : float
-        Height of the top of the last ring above that.
+        Height of the top of the last ring above the bottom of the first ring.
     thickness_m : ndarray, shape (n,)
     modulus_pa : float
     lowest_m, highest_m : float
-        Dips of the lowest and the highest row that are used.
+        Dips of the lowest and highest rows used.
     fittings : tuple of Fitting
     roof_m3, roof_zone_m : float, (float, float) or None
-        What the roof takes above its critical zone; None: no roof.
+        Effect of the roof above its critical zone; None: no roof.
     free : frozenset of str
-        Of "base", "density", "zero", "seams", "kinks": what else than radii and volumes is unknown.
+        Unknowns besides radii and volumes, among "base", "density", "zero", "seams", "kinks".
     is_first_order : bool
-        Of the head.
+        Whether the head is of first order.
     density_sd_kg_m3 : float
-        Of the density that an adjustment starts with, as an observation of it.
+        Prior standard deviation of the density.
     usual_density_kg_m3 : float or None
-        The density to which `density_sd_kg_m3` belongs; None: with which an adjustment starts.
+        Prior density; None: the start value of an adjustment.
     bulges_m : ndarray, shape (n, degrees), or None
         Profiles of the courses (`bulges`); None: straight courses.
     """
@@ -77,12 +77,12 @@ class State:
 
     @property
     def rings(self):
-        """The Rings, in dips."""
+        """The Rings, at dips."""
         heights = np.concatenate([[0.0], self.seams_m, [self.rings_top_m]])
         return Rings(self.zero_m + heights, self.thickness_m, self.modulus_pa, self.is_first_order)
 
     def volume_m3(self, dips_m):
-        """(rows,) volume below each dip."""
+        """Volume below each dip, shape (rows,), m3."""
         dips = np.append(dips_m, self.lowest_m)
         shell = self.shell_m3(dips)
         volume = self.base_m3 + shell[:-1] - shell[-1]
@@ -92,7 +92,7 @@ class State:
         return volume + self._roof_share(dips_m) * self.roof_m3
 
     def shell_m3(self, dips_m):
-        """(rows,) volume of the courses below each dip."""
+        """Volume of the courses below each dip, shape (rows,), m3."""
         volume = self.rings.volume_m3(dips_m, self.radii_m, self.density_kg_m3)
         if self.bulges_m is None:
             return volume
@@ -106,7 +106,7 @@ class State:
 
     @property
     def layout(self):
-        """{name: slice} of the unknowns; of each thing three: bottom, top, volume."""
+        """{name: slice} of the unknowns; each fitting has three: bottom, top, volume."""
         sizes = {
             "base": int("base" in self.free),
             "radii": len(self.radii_m),
@@ -125,7 +125,7 @@ class State:
 
     @property
     def unknowns(self):
-        """(u,) their values."""
+        """Values of the unknowns, shape (u,)."""
         things = [(f.bottom_m, f.top_m, f.volume_m3) for f in self.fittings]
         values = {
             "base": [self.base_m3],
@@ -142,7 +142,7 @@ class State:
         )
 
     def with_unknowns(self, unknowns):
-        """The same with other values."""
+        """Return the state with other values of the unknowns."""
         given = {name: unknowns[part] for name, part in self.layout.items()}
         changes = {"radii_m": given["radii"]}
         for name, key in (("base", "base_m3"), ("density", "density_kg_m3"), ("zero", "zero_m"),
@@ -158,7 +158,7 @@ class State:
         return replace(self, **changes)
 
     def design(self, dips_m):
-        """(rows, u) derivatives of `volume_m3` by the unknowns."""
+        """Derivatives (rows, u) of `volume_m3` by the unknowns."""
         dips = np.append(dips_m, self.lowest_m)
         by_radius, by_density, by_edge = self.rings.derivatives(
             dips, self.radii_m, self.density_kg_m3
@@ -189,22 +189,22 @@ class State:
 
 @dataclass(frozen=True)
 class Fit:
-    """A State that was adjusted to rows.
+    """A State adjusted to rows.
 
     Attributes
     ----------
     state : State
     cofactor : ndarray, shape (u, u)
-        Covariance of its unknowns, of rounding alone.
+        Covariance of the unknowns by rounding only.
     left_m3 : ndarray, shape (rows,)
-        Table less state.
+        Table minus state.
     sd_m3 : ndarray, shape (rows,)
-        By rounding.
+        Standard deviations by rounding.
     design : ndarray, shape (rows, u)
     chi2 : float
-        Of the rows.
+        chi2 of the rows.
     bulges : (ndarray, ndarray, ndarray)
-        Of what bulges are expected to be: (k, u) derivatives, (k,) discrepancies, (k,) sds.
+        Prior of the bulges: (k, u) derivatives, (k,) discrepancies, (k,) sds.
     """
 
     state: State
@@ -217,12 +217,12 @@ class Fit:
 
     @property
     def cost(self):
-        """chi2, with that of the bulges."""
+        """chi2 of rows and bulges."""
         return self.chi2 + float(np.sum((self.bulges[1] / self.bulges[2]) ** 2))
 
     @property
     def dof(self):
-        """Rows less unknowns that were not held."""
+        """Rows minus unknowns that are not fixed."""
         return len(self.left_m3) - int(np.count_nonzero(np.diag(self.cofactor)))
 
     def sd(self, name):
@@ -237,7 +237,7 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     Parameters
     ----------
     state : State
-        With start values; seams and kinks are looked for about them, the zero about 0, weakly.
+        Start values. Seams and kinks have weak priors about them, the zero about 0.
     dips_m, volumes_m3, sd_m3 : (rows,) ndarray
 
     Returns
@@ -247,7 +247,7 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     Raises
     ------
     SolutionError
-        When the rows do not determine the unknowns.
+        If the rows do not determine the unknowns.
     """
     held, known, about, sds = _priors(state)
     moving = np.setdiff1d(np.arange(len(state.unknowns)), held)
@@ -282,7 +282,7 @@ def fit(state, dips_m, volumes_m3, sd_m3):
 
 
 def _expected_bulges(state):
-    """Derivatives, discrepancies and sds of the bulges as observations of their own."""
+    """Derivatives, discrepancies and sds of the bulges as prior observations."""
     part = np.eye(len(state.unknowns))[state.layout["bulges"]]
     if not len(part):
         return part, np.zeros(0), np.zeros(0)
@@ -290,12 +290,12 @@ def _expected_bulges(state):
 
 
 def _tangent(w, design):
-    """The linear model of a step, for `adjust`."""
+    """Linear model of a step, for `adjust`."""
     return lambda x, l: (w + design @ x - l, design, None)
 
 
 def _priors(state):
-    """Unknowns that are held; those that are weakly known, where about, and their sds."""
+    """Return fixed unknowns, and unknowns with weak priors, their values and sds."""
     layout = state.layout
     sds, held = {}, []
     density_sd = state.density_sd_kg_m3
@@ -323,7 +323,7 @@ def _priors(state):
 
 
 def held_kinks(state, fitting):
-    """(bottom, top): whether a thing's kink is outside of the rows, and cannot be looked for."""
+    """Whether (bottom, top) kinks of a fitting lie outside the rows and are therefore fixed."""
     if "kinks" not in state.free:
         return True, True
     return fitting.bottom_m <= state.lowest_m, fitting.top_m >= state.highest_m
@@ -344,28 +344,28 @@ class Rows:
     sd_m3: np.ndarray
 
     def above(self, dip_m):
-        """Those from a dip on."""
+        """Return the rows from a dip upwards."""
         return self.of(self.dip_m >= dip_m - 1e-9)
 
     def of(self, mask):
-        """Those of a mask."""
+        """Return the rows of a mask."""
         return Rows(self.dip_m[mask], self.volume_m3[mask], self.sd_m3[mask])
 
     def thinned(self, most):
-        """At most so many of them, evenly, the first and the last among them."""
+        """Return at most `most` evenly chosen rows, including the first and the last."""
         chosen = np.zeros(len(self.dip_m), dtype=bool)
         chosen[np.unique(np.linspace(0, len(self.dip_m) - 1, most).round().astype(int))] = True
         return self.of(chosen)
 
     def adjust(self, state):
-        """The Fit of a State to them."""
+        """Return the Fit of a State to the rows."""
         lowest, highest = float(self.dip_m[0]), float(self.dip_m[-1])
         state = replace(state, lowest_m=lowest, highest_m=highest)
         return fit(state, self.dip_m, self.volume_m3, self.sd_m3)
 
 
 def tried(rows, state):
-    """The Fit of a State to Rows, or None where they do not determine it."""
+    """Return the Fit of a State to Rows, or None if the rows do not determine it."""
     try:
         return rows.adjust(state)
     except SolutionError:

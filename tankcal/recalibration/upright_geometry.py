@@ -1,10 +1,10 @@
-"""The geometry of an upright tank out of its capacity table.
+"""Geometry of an upright tank from its capacity table.
 
-Rows below the highest point of the bottom, and those of a roof's critical zone, are left out; the
-others are adjusted (`table_fit.fit`). What stands in the tank is looked for as pairs of kinks
-(`fittings.find_fittings`), one after the other, until none explains more than rounding does by
-chance. Then the table is asked whether it has a head, where its zero is, and whether the seams are
-where they were declared to be.
+Rows below the highest point of the bottom, and rows in the critical zone of a roof, are excluded.
+The other rows are adjusted (`table_fit.fit`). Fittings are sought as pairs of kinks
+(`fittings.find_fittings`), in turn, until no pair explains more than rounding can by chance. The
+rows then decide whether the table includes a head, where its zero is, and whether the seams agree
+with the declared ones.
 """
 
 from dataclasses import dataclass, replace
@@ -26,20 +26,20 @@ from tankcal.recalibration.upright_search import (
 
 STEEL_PA = 206e9
 START_DENSITY_KG_M3 = 500.0
-USUAL_KG_M3 = 450.0, 450.0  # of a head that a table cannot tell: about this, with this sd
+USUAL_KG_M3 = 450.0, 450.0  # prior mean and sd of a density that the table does not determine
 DECLARED_SD_KG_M3 = 10.0
-HELD_SD_KG_M3 = 0.1  # of a density that rows must not move
-LIQUID_KG_M3 = 500.0  # a head that a table could not have shown of any liquid is undecided
-LIGHTEST_KG_M3 = 100.0  # a lower density of a head is that of no liquid
-DENSEST_KG_M3 = 2000.0  # of a liquid that is stored in such tanks; sulphuric acid has 1840
-FEWEST_ROWS = 3  # of a ring
-BY_ORDER = 1.0  # of chi2, by which the head of second order has to fit better
+HELD_SD_KG_M3 = 0.1  # standard deviation of a fixed density
+LIQUID_KG_M3 = 500.0  # density of a light liquid; a head not detectable at it is undecided
+LIGHTEST_KG_M3 = 100.0  # smallest density of a possible liquid
+DENSEST_KG_M3 = 2000.0  # largest density of a stored liquid; sulphuric acid has 1840
+FEWEST_ROWS = 3  # fewest rows of a ring
+BY_ORDER = 1.0  # smallest reduction of chi2 for which the head of second order is used
 ORDER_IS_CLEAR = 9.0
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A value that was read out of a table, and what rounding leaves uncertain of it (standard)."""
+    """A value estimated from a table, and its standard uncertainty by rounding."""
 
     value: float
     u: float
@@ -47,12 +47,12 @@ class Reading:
 
 @dataclass(frozen=True)
 class FoundFitting:
-    """A thing that the table has deducted, or added.
+    """A fitting deducted or added in a table.
 
     Attributes
     ----------
     bottom_m, top_m, volume_m3 : Reading
-        Dips; u is nan where the end is beyond the rows that were used.
+        Dips and volume; u is nan for an end outside the rows used.
     """
 
     bottom_m: Reading
@@ -62,49 +62,49 @@ class FoundFitting:
 
 @dataclass(frozen=True)
 class UprightGeometry:
-    """What a table says of its tank.
+    """Geometry of an upright tank estimated from a table.
 
     Attributes
     ----------
     name : str
-        Of the table.
+        Name of the table.
     radii_m, u_m : ndarray, shape (n,)
-        Inside, of the empty shell, at the table's temperature; u by rounding alone.
+        Inside radii of the empty shell at the table's temperature; u by rounding only.
     covariance_m2 : ndarray, shape (n, n)
-        Of the radii.
+        Covariance of the radii.
     heights_m, thickness_m : ndarray, shape (n,)
-        Of the rings that the table reaches.
+        Rings within the table.
     zero_m : Reading
-        Dip of the bottom of the first ring; u is 0 where the table is empty at its zero and begins
-        there, nan where that cannot be told because the seams are found, too.
+        Dip of the bottom of the first ring. u is 0 if the table is empty at its zero and begins
+        there; nan if unknown because the seams are estimated as well.
     seams_m : tuple of Reading
-        Dips of the seams, each looked for by itself; u is large where nothing jumps there.
+        Dips of the seams, each estimated separately; u is large if the area does not jump there.
     seams_are : {"declared", "found"}
-        Which of them the radii are for.
+        Which seams the radii refer to.
     density_kg_m3 : Reading
     head : {"with", "without", "undecided"}
     t : float
         Density over its u.
     fittings : tuple of FoundFitting
     roof_m3 : Reading or None
-        What a declared roof takes above its critical zone; negative.
+        Effect of a declared roof above its critical zone; negative.
     base_m3 : Reading
-        Volume at `lowest_m`, the lowest row that is used.
+        Volume at `lowest_m`, the lowest row used.
     lowest_m : float
     used : ndarray of bool, shape (rows,)
     left_m3 : ndarray, shape (rows,)
-        Table less what was read, at each row.
+        Table minus geometry, at each row.
     rms_m3, largest_m3, expected_m3 : float
-        Of the rows that are used; what rounding would leave.
+        Rms and largest residual of the rows used; rms expected from rounding.
     without_head : (rms, largest, radii) or None
-        Of the same with the head left out: m3, m3, (n,) m.
+        Results without a head: m3, m3, (n,) m.
     roughness : float
-        What u was multiplied by because rows have more in them than rounding; 1: nothing.
+        Factor of u because residuals exceed rounding; 1 if they do not.
     state : State
-        All of it, as a function of the dip.
+        The complete model, as a function of the dip.
     independent_u : (float, ndarray)
-        Standard deviations of density and (n,) radii if each row were rounded independently of the
-        others; u is never less (`rounding`).
+        Standard deviations of density and (n,) radii for independent rounding of each row; u is
+        never smaller (`rounding`).
     """
 
     name: str
@@ -144,18 +144,18 @@ def read_upright(
     lowest_m=None,
     seams_known=True,
 ):
-    """Radii, density of the head, zero, things in the tank: out of a table.
+    """Estimate radii, density of the head, zero and fittings from a table.
 
     Parameters
     ----------
     former : FormerTable
     heights_m, thickness_m : array_like, shape (n,)
-        Of the rings, from the bottom up; all must be reached by the table.
+        Rings from the bottom up; the table must reach all of them.
     modulus_pa : float
     known : sequence of Fitting
-        Things that are known to be in the table, in its dips: taken out first.
+        Known fittings, at dips of the table; they are removed first.
     lowest_m : float, optional
-        Dip of the highest point of the bottom; None: found.
+        Dip of the highest point of the bottom; None: estimated.
     seams_known : bool
         False: `heights_m` are start values only.
 
@@ -166,7 +166,7 @@ def read_upright(
     Raises
     ------
     SolutionError
-        When rows are too few, or do not determine the radii.
+        If there are too few rows, or they do not determine the radii.
     """
     heights, plates = np.asarray(heights_m, float), np.asarray(thickness_m, float)
     volume = former.volume_m3 - sum((one.volume_below_m3(former.height_m) for one in known), 0.0)
@@ -186,7 +186,7 @@ def read_upright(
 
 
 def _start(rows, heights, plates, modulus, zone):
-    """The State before anything is adjusted: radii by the mean area of each ring."""
+    """Return the initial State, with radii from the mean area of each ring."""
     edges = np.concatenate([[0.0], np.cumsum(heights)])
     radii = np.zeros(len(heights))
     for k in range(len(heights)):
@@ -263,14 +263,14 @@ def _geometry(former, found, rows, used, seams_known):
 
 
 def _independent(found):
-    """(density, (n,) radii): their standard deviations if rounding were independent."""
+    """Standard deviations of density and radii (n,) for independent rounding."""
     return float(found.sd("density")[0]), found.sd("radii")
 
 
 def _with_order(rows, found):
-    """The Fit with the head of the order that leaves less, and that of the other one.
+    """Return the Fit with the order of the head that fits better, and the Fit with the other order.
 
-    The first order where both do as well; the other is None where it is clearly worse.
+    The first order is used if both fit equally. The second Fit is None if it is clearly worse.
     """
     try:
         second = rows.adjust(replace(found.state, is_first_order=False))
@@ -282,7 +282,7 @@ def _with_order(rows, found):
 
 
 def _by_order(found, other):
-    """(sd of density, (n,) of radii) because the order of the head is not known."""
+    """Contribution of the unknown order of the head to the sds of density and radii (n,)."""
     if other is None:
         return 0.0, np.zeros(len(found.state.radii_m))
     density = abs(found.state.density_kg_m3 - other.state.density_kg_m3)
@@ -290,7 +290,7 @@ def _by_order(found, other):
 
 
 def _with_known_zero(rows, former, found):
-    """The Fit with an empty tank at dip 0, the bottom of the first ring: when nothing says no."""
+    """Return the Fit of a tank empty at dip 0, the bottom of the first ring, if rows allow it."""
     if not (rows.dip_m[0] == 0 and rows.volume_m3[0] == 0) or former.volume_quantum_m3 == 0:
         return found
     free = found.state.free - {"zero", "base"}
@@ -302,7 +302,7 @@ def _with_known_zero(rows, former, found):
 
 
 def _free_seams(rows, found):
-    """The Fit with each seam where it is found by itself; None where that fails."""
+    """Return the Fit with separately estimated seams; None if it has no solution."""
     if not len(found.state.seams_m):
         return None
     free = (found.state.free | {"seams"}) - {"zero"}
@@ -314,7 +314,7 @@ def _free_seams(rows, found):
 
 
 def _are_elsewhere(found, seams):
-    """Whether seams are not where they were declared: one of them clearly, or all by chi2."""
+    """Whether seams differ from the declared ones: one of them clearly, or all together by chi2."""
     apart = np.abs(seams.state.seams_m - found.state.seams_m)
     count = len(apart)
     return bool(np.any(apart > CRITICAL * seams.sd("seams"))) and (
@@ -323,7 +323,7 @@ def _are_elsewhere(found, seams):
 
 
 def _without_head(rows, found):
-    """The Fit of the same with the head left out."""
+    """Return the Fit without a head."""
     free = found.state.free - {"density"}
     dry = replace(found.state, density_kg_m3=0.0, free=free)
     found = tried(rows, dry) or tried(rows, replace(dry, free=free - {"kinks"}))
@@ -331,13 +331,13 @@ def _without_head(rows, found):
 
 
 def _usual_density(former):
-    """(density, sd) of the declared head, or of the head of some liquid or none."""
+    """Return (density, sd) of the declared head, or the prior of an unknown head."""
     declared = former.liquid_density_kg_m3
     return USUAL_KG_M3 if declared is None else (declared, DECLARED_SD_KG_M3)
 
 
 def _with_usual_density(rows, former, found, dry):
-    """The Fit with the declared density, or that of some liquid or none: the table cannot tell."""
+    """Return the Fit with the prior density, as the table does not determine it."""
     usual, sd = _usual_density(former)
     state = replace(
         found.state, density_kg_m3=usual, usual_density_kg_m3=usual, density_sd_kg_m3=sd
@@ -346,7 +346,7 @@ def _with_usual_density(rows, former, found, dry):
     density = again.state.density_kg_m3
     if LIGHTEST_KG_M3 <= density <= DENSEST_KG_M3:
         return again
-    # No liquid has this density: the shell is that of the nearest possible one, and u stays.
+    # The density is impossible: use the shell at the nearest possible density, and keep u.
     if density > DENSEST_KG_M3:
         nearest = tried(rows, replace(state, density_sd_kg_m3=HELD_SD_KG_M3)) or dry
     else:
@@ -356,10 +356,10 @@ def _with_usual_density(rows, former, found, dry):
 
 
 def _decide_head(density, declared_kg_m3, is_rough):
-    """Whether a table has a head: "with", "without" or "undecided".
+    """Decide whether a table includes a head: "with", "without" or "undecided".
 
-    A wall that bulges, and rows with more in them than rounding, look like a head: there a declared
-    density holds. A density that no liquid has is none.
+    A bulging wall, or rows with errors beyond rounding, resemble a head. A declared density then
+    takes precedence. An impossible density counts as no head.
     """
     if is_rough and declared_kg_m3 is not None:
         return "undecided" if declared_kg_m3 > 0 else "without"
@@ -371,7 +371,7 @@ def _decide_head(density, declared_kg_m3, is_rough):
 
 
 def is_possible(density):
-    """Whether a liquid may have the density of a Reading, within its u."""
+    """Whether the density of a Reading is possible for a liquid, within its u."""
     reach = CRITICAL * density.u
     return -reach <= density.value <= DENSEST_KG_M3 + reach
 
@@ -420,7 +420,10 @@ def _as_geometry(former, found, rows, used, *, scale, density, head, t, without,
 
 
 def _zero_reading(state, sds):
-    """Zero, with u 0 where the table is empty at its zero, nan where seams are not known."""
+    """Reading of the zero.
+
+    U is 0 if the table is empty at its zero, nan if the seams are unknown.
+    """
     if len(sds):
         return Reading(state.zero_m, float(sds[0]))
     return Reading(state.zero_m, np.nan if "base" in state.free else 0.0)

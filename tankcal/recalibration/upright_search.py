@@ -1,10 +1,10 @@
-"""The search for what a table of an upright tank is made of: bottom, zero, things, seams.
+"""Search for the components of an upright tank in its table: bottom, zero, fittings, seams.
 
-The first ring is followed downwards as far as its rows are those of one cut: below is the bottom.
-The zero is taken where seams jump together (`zero.find_zeros`). Things are looked for as pairs of
-kinks, one after the other, until none explains more than rounding does by chance; where they are
-many, or look like seams from a wrong zero, other zeros and moved seams are tried, and what explains
-the rows by the fewest things is believed.
+Starting from the top of the first ring, rows are followed downwards while they fit one cross
+section; the bottom is below. The zero is where the seams jump together (`zero.find_zeros`).
+Fittings are sought as pairs of kinks, in turn, until no pair explains more than rounding can by
+chance. If there are many fittings, or some may be seams of a wrong zero, other zeros and moved
+seams are tried. The model with the fewest fittings is chosen.
 """
 
 from dataclasses import replace
@@ -21,42 +21,44 @@ from tankcal.recalibration.table_fit import DENSITY_SD_KG_M3, tried
 from tankcal.recalibration.zero import FARTHEST_M, find_zeros, move_seams
 
 SEAMS_FREE = "base", "density", "seams"
-LEAST_GAIN = 25.0  # of chi2 by a thing: less is what the best of all pairs gains by chance
+LEAST_GAIN = 25.0  # smallest reduction of chi2 by a fitting; the best pair gains less by chance
 MOST_FITTINGS, FEW_FITTINGS = 12, 4
-DOUBTFUL_GAIN, CHANCES, MARGIN = 300.0, 8, 1.2  # of a thing that rounding may look like
-LEAST_SIZE = 3.0  # last digits of the table
-PRICE = 50.0  # of chi2, of a thing: what explains the rows at the lowest price is believed
+# A fitting with less gain than this is compared with simulated roundings: number and margin.
+DOUBTFUL_GAIN, CHANCES, MARGIN = 300.0, 8, 1.2
+LEAST_SIZE = 3.0  # smallest volume of a fitting, last digits of the table
+PRICE = 50.0  # penalty of a fitting, added to chi2 in the choice of a model
 SAME_COST = 1.0
-LEAST_CHI2 = 0.8  # of a degree of freedom, by which no table is under
-SAME_SLOPES = 0.03, 0.15  # of the largest kink, that are none, when kinks are paired again
-LENGTHS_M = 1.0, 3.0, np.inf  # of things, in the order in which they are looked for
-USUAL_ZEROS_M = 0.0, -0.04, 0.04  # that are tried, too, where things are many
-NEAR_M = 0.025  # that the zero may go from where it was looked for
-CUT_M, CUT_ROWS = 0.4, 9  # of the rows that have to be of one cut, so that the bottom is below
+LEAST_CHI2 = 0.8  # smallest chi2 per degree of freedom
+SAME_SLOPES = 0.03, 0.15  # sizes of ignored kinks, relative to the largest, in other pairings
+LENGTHS_M = 1.0, 3.0, np.inf  # largest heights of fittings in successive searches
+USUAL_ZEROS_M = 0.0, -0.04, 0.04  # further zeros tried if there are many fittings
+NEAR_M = 0.025  # largest distance of the zero from its start value
+CUT_M, CUT_ROWS = 0.4, 9  # height and number of rows of one cross section above the bottom
 BOTTOM_TRIES = 60
-BULGED_DEGREE, MOST_BULGED_ROWS = 4, 400  # of the volume in CUT_M; of a search for things
-SURE_OF_BULGED = 8.0  # standard uncertainties of a thing where courses bulge
-JOINT_M, DRAWN_IN_M = 0.15, 3e-3  # about a joint; of the radius
-LONGEST_BULGED_M = 1.2  # of a thing where courses bulge: a longer thing looks like their profile
-LOW_M, LOW_SHARE = 0.15, 0.2  # things lower than this take no more of the cut: that is the bottom
-TAKEN_SHARE, GIVEN_SHARE = 0.7, 0.1  # of the cut, that a thing takes or gives at most
-EDGE_M = 0.1  # below the first seam: where rows of the first ring end, the zero being unknown
-SAME_ZERO = 3.0  # standard deviations
+# Degree of the volume within CUT_M, and largest number of rows, for courses that bulge.
+BULGED_DEGREE, MOST_BULGED_ROWS = 4, 400
+SURE_OF_BULGED = 8.0  # smallest fitting where courses bulge, standard uncertainties
+JOINT_M, DRAWN_IN_M = 0.15, 3e-3  # zone about a joint, and radial deformation of plates there
+LONGEST_BULGED_M = 1.2  # highest fitting where courses bulge; a higher one resembles a profile
+LOW_M, LOW_SHARE = 0.15, 0.2  # height of low fittings and their largest share of the area
+TAKEN_SHARE, GIVEN_SHARE = 0.7, 0.1  # largest share of the area that a fitting removes or adds
+EDGE_M = 0.1  # distance of the top row of the first ring below the first seam (unknown zero)
+SAME_ZERO = 3.0  # standard deviations within which two zeros are equal
 
 
 def search(rows, state, lowest_m, usual_density):
-    """The Fit of all that is found in rows.
+    """Return the Fit of all components found in rows.
 
     Parameters
     ----------
     rows : Rows
     state : State
-        With start values.
+        Start values.
     lowest_m : float or None
-        Dip of the highest point of the bottom; None: found.
+        Dip of the highest point of the bottom; None: estimated.
     usual_density : (float, float)
-        Density of the head and its standard deviation, kg/m3, for courses that bulge: a taper of
-        the courses looks like a head.
+        Density of the head and its standard deviation, kg/m3, for bulging courses: a taper of the
+        courses resembles a head.
 
     Returns
     -------
@@ -65,7 +67,7 @@ def search(rows, state, lowest_m, usual_density):
     Raises
     ------
     SolutionError
-        When the rows do not determine the radii.
+        If the rows do not determine the radii.
     """
     edges = state.rings.edges_m
     shows_bulges = show_bulges(rows.dip_m, rows.volume_m3, rows.sd_m3, edges)
@@ -76,7 +78,7 @@ def search(rows, state, lowest_m, usual_density):
     found = _search_straight(rows, state, lowest_m)
     if shows_bulges or _is_plain(found) or _is_by_rounding(found):
         return found
-    # Many things, or things that end at joints: that is what a coarse table makes of bulges.
+    # In a coarse table, bulges look like many fittings, or like fittings that end at joints.
     bulged = _search_bulged(rows, state, lowest_m, *usual_density)
     is_simpler = bulged is not None and (
         len(bulged.state.fittings) < len(found.state.fittings) and _cost(bulged) < _cost(found)
@@ -85,7 +87,7 @@ def search(rows, state, lowest_m, usual_density):
 
 
 def _search_straight(rows, state, lowest_m):
-    """The Fit of straight courses; arguments as of `search`."""
+    """Return the Fit of straight courses; the arguments are those of `search`."""
     if lowest_m is not None:
         rows = rows.above(lowest_m)
         return _with_moved_seams(rows, _with_fittings(rows, state))
@@ -103,10 +105,10 @@ def _search_straight(rows, state, lowest_m):
 
 
 def _search_bulged(rows, state, lowest_m, density, density_sd):
-    """The Fit of courses that bulge, with things that the profiles do not explain; None: fails.
+    """Return the Fit of bulging courses with fittings that the profiles do not explain, or None.
 
-    Seams are where they were declared. What the profiles leave goes on from row to row, and two
-    kinks explain some of it: a thing has to explain more than that.
+    Seams are kept as declared. Residuals of the profiles are correlated from row to row, and two
+    kinks explain part of them. A fitting must explain more.
     """
     lowest = _lowest_row(rows, state, BULGED_DEGREE) if lowest_m is None else lowest_m
     start = replace(
@@ -136,7 +138,7 @@ def _search_bulged(rows, state, lowest_m, density, density_sd):
 
 
 def _is_straight(rows, found):
-    """Whether straight courses with the same things explain the rows as well as profiles do."""
+    """Whether straight courses with the same fittings fit as well as profiles."""
     state = replace(
         found.state,
         bulges_m=None,
@@ -144,13 +146,13 @@ def _is_straight(rows, found):
         density_sd_kg_m3=DENSITY_SD_KG_M3,
     )
     rows = rows.above(found.state.lowest_m)
-    free_zero = replace(state, free=state.free | {"zero"})  # profiles absorb a wrong zero
+    free_zero = replace(state, free=state.free | {"zero"})  # profiles absorb an error of the zero
     tries = (tried(rows, one) for one in (state, free_zero))
     return any(one is not None and one.chi2 < found.cost + PRICE for one in tries)
 
 
 def _without_unsure(rows, found):
-    """The Fit without the things that are not sure where courses bulge."""
+    """Return the Fit without insignificant fittings, where courses bulge."""
     while found.state.fittings:
         sds = found.sd("fittings")[2::3] * roughness(found, rows)
         sizes = np.abs([one.volume_m3 for one in found.state.fittings]) / np.maximum(sds, 1e-12)
@@ -164,7 +166,7 @@ def _without_unsure(rows, found):
 
 
 def _is_of_joint(state, thing):
-    """Whether a thing gives room, or is what plates that are drawn in at a joint look like."""
+    """Whether a fitting adds volume, or resembles plates drawn in at a joint."""
     joints = state.rings.edges_m
     ends = np.array([[thing.bottom_m], [thing.top_m]])
     girth = 2 * np.pi * float(state.radii_m[0])
@@ -174,7 +176,7 @@ def _is_of_joint(state, thing):
 
 
 def _with_moved_seams(rows, found):
-    """The Fit with seams where the rows show them, if that spares things that look like seams."""
+    """Return the Fit with seams from the rows, if this removes fittings that resemble seams."""
     if _is_plain(found) or not len(found.state.seams_m):
         return found
     zero = found.state.zero_m
@@ -190,23 +192,23 @@ def _with_moved_seams(rows, found):
 
 
 def _is_enough(rows, found, whole):
-    """Whether rows far more than their new unknowns are explained by these."""
+    """Whether the reduction of chi2 is large for the number of new unknowns."""
     return len(rows.dip_m) - len(found.left_m3) > 10 * (
         len(whole.state.unknowns) - len(found.state.unknowns)
     )
 
 
 def _is_by_rounding(found):
-    """Whether nothing is left but rounding: as a whole, and at the worst row."""
+    """Whether all residuals are within rounding: as a whole, and at the worst row."""
     worst = np.abs(found.left_m3 / found.sd_m3).max()
     return found.chi2 < ROUGH**2 * max(found.dof, 1) and worst < np.sqrt(3) * 1.25
 
 
 def _lowest_row(rows, state, degree=2):
-    """Dip from which on rows are those of one cut: above the highest point of the bottom.
+    """Lowest dip above the highest point of the bottom: rows from there on fit one cross section.
 
-    The lowest row of the first ring above which a parabola, or a polynomial of another degree for
-    courses that bulge, leaves nothing but rounding.
+    The result is the lowest row of the first ring above which a polynomial leaves only rounding.
+    Its degree is 2, or higher for bulging courses.
     """
     first = rows.dip_m <= state.seams_m[0] - EDGE_M if len(state.seams_m) else rows.dip_m >= 0
     ring = rows.of(first)
@@ -223,14 +225,14 @@ def _lowest_row(rows, state, degree=2):
 
 
 def _halving(tries):
-    """At most BOTTOM_TRIES of the rows, rising; closer together at the bottom."""
+    """At most BOTTOM_TRIES of the rows, rising, closer together near the bottom."""
     last = len(tries) - 1
     places = np.round(last * np.linspace(0, 1, BOTTOM_TRIES) ** 1.5).astype(int)
     return tries[np.unique(places)]
 
 
 def _is_one_cut(ring, degree):
-    """Whether a polynomial leaves no more than rounding of rows."""
+    """Whether a polynomial fits rows within rounding."""
     if len(ring.dip_m) < degree + 3:
         return False
     x = (ring.dip_m - ring.dip_m[0]) / (ring.dip_m[-1] - ring.dip_m[0])
@@ -239,7 +241,7 @@ def _is_one_cut(ring, degree):
     left = value - basis @ np.linalg.lstsq(basis, value, rcond=None)[0]
     dof = len(x) - degree - 1
     is_rounding = np.abs(left).max() < np.sqrt(3) * 1.25
-    lower = left[: max(len(left) // 4, 2)]  # a bottom shows here first
+    lower = left[: max(len(left) // 4, 2)]  # a bottom appears in the lowest rows first
     return (
         is_rounding
         and left @ left < dof + 4 * np.sqrt(dof)
@@ -248,10 +250,10 @@ def _is_one_cut(ring, degree):
 
 
 def _with_fittings(rows, state, at_most=MOST_FITTINGS):
-    """The Fit with the things that the rows show, from the zero that needs the fewest of them.
+    """Return the Fit with the fittings in the rows, for the zero that needs the fewest of them.
 
-    A zero that is far off lets seams look like things, so that others are tried where things are
-    many, or do not explain the rows.
+    With a wrong zero, seams resemble fittings. Other zeros are therefore tried if there are many
+    fittings, or if the fittings do not explain the rows.
     """
     zeros = find_zeros(rows.dip_m, rows.volume_m3, rows.sd_m3, state.seams_m)
     best, tried = None, 0
@@ -270,13 +272,15 @@ def _with_fittings(rows, state, at_most=MOST_FITTINGS):
             message("former_undetermined", "the rows of the table do not determine the radii")
         )
     if len(best.state.fittings) > FEW_FITTINGS and not _is_by_rounding(best):
-        bare = replace(best.state, fittings=())  # things without end explain what is not their own
+        bare = replace(
+            best.state, fittings=()
+        )  # fittings of unlimited height also explain other effects
         best = _with_free_zero(rows.above(best.state.lowest_m), bare, bare.zero_m) or best
     return _with_lower_rows(rows, best)
 
 
 def _with_lower_rows(rows, found):
-    """The Fit with rows that were left out because the first ring might have begun among them."""
+    """Return the Fit with rows that were excluded because the first ring might begin among them."""
     more = len(rows.dip_m) - len(found.left_m3)
     for lowest in rows.dip_m[:more]:
         chosen = rows.above(lowest)
@@ -289,12 +293,12 @@ def _with_lower_rows(rows, found):
 
 
 def _most_fittings(best):
-    """How many things another Fit may have and still be the cheaper one."""
+    """Largest number of fittings with which another Fit may cost less."""
     return max(int((_cost(best) - LEAST_CHI2 * best.dof) / PRICE), 0)
 
 
 def _is_plain(found):
-    """Whether its things are few, and none of them what seams look like from a wrong zero."""
+    """Whether there are few fittings, and none resembles a seam of a wrong zero."""
     seams = found.state.rings.edges_m[1:-1]
     return len(found.state.fittings) <= FEW_FITTINGS and all(
         one.volume_m3 < 0
@@ -310,9 +314,10 @@ def _cost(found):
 
 
 def _from_zero(rows, start, at_most):
-    """The Fit with things, the zero free about where it starts; None where rows do not do.
+    """Return the Fit with fittings and the zero free about its start value, or None.
 
-    Short things first: two kinks of two things, one above the other, look like one thing.
+    Low fittings are sought first: two kinks of two fittings, one above the other, resemble one
+    fitting.
     """
     about = start.zero_m
     found = _with_free_zero(rows, start, about)
@@ -326,11 +331,13 @@ def _from_zero(rows, start, at_most):
 
 
 def _with_one_more(rows, found, longest, about, rough=False):
-    """The Fit with the thing that explains most; None where none explains enough.
+    """Return the Fit with the fitting that explains most; None if no fitting explains enough.
 
-    rough  whether more than rounding is left over: enough is then measured by what is left
+    rough: whether residuals exceed rounding; the required gain is then relative to the residuals.
     """
-    design, left, sds = found.bulges  # observations that no thing changes: as at the lowest row
+    design, left, sds = (
+        found.bulges
+    )  # prior observations do not depend on a fitting: place them at the lowest row
     candidates = find_fittings(
         np.append(np.full(len(sds), rows.dip_m[0]), rows.dip_m),
         np.append(left, found.left_m3),
@@ -355,12 +362,12 @@ def _with_one_more(rows, found, longest, about, rough=False):
 
 
 def _is_large(rows, thing):
-    """Whether a thing is larger than what two rounded digits explain."""
+    """Whether a fitting is larger than the effect of two rounded digits."""
     return abs(thing.volume_m3) > LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
 
 
 def _tidied(rows, found, about):
-    """The Fit with fewer things, where fewer explain the rows as well."""
+    """Return the Fit with fewer fittings, if fewer fit equally well."""
     if len(found.state.fittings) > 1:
         near = 1.6 * float(np.median(np.diff(rows.dip_m)))
         for share in SAME_SLOPES:
@@ -373,7 +380,7 @@ def _tidied(rows, found, about):
 
 
 def with_sure_fittings(rows, found, quantum_m3):
-    """The Fit without things whose volume is no more than its uncertainty, the least sure first."""
+    """Return the Fit without fittings whose volume does not exceed its uncertainty."""
     found = without_phantoms(rows, found, quantum_m3)
     while found.state.fittings:
         things = found.state.fittings
@@ -392,10 +399,10 @@ def with_sure_fittings(rows, found, quantum_m3):
 
 
 def without_phantoms(rows, found, quantum_m3):
-    """The Fit without things whose u is beyond their volume.
+    """Return the Fit without fittings whose u exceeds their volume.
 
-    They go even where they explain rows: what these have more in them is told as such, not as a
-    thing of any size. Seams that are free leave such things, where they take over a kink.
+    They are removed even if they explain residuals, which are then reported as excess residuals.
+    Free seams can leave such fittings when they replace a kink.
     """
     while found.state.fittings:
         sizes = _sizes(rows, found, quantum_m3)
@@ -413,7 +420,7 @@ def without_phantoms(rows, found, quantum_m3):
 
 
 def _sizes(rows, found, quantum_m3):
-    """(things,) volumes over their u; 0 where that is not known."""
+    """Volumes of fittings over their u, shape (fittings,); 0 if u is unknown."""
     scale = scale_of_u(found, rows, quantum_m3)[found.state.layout["fittings"]]
     sds = (found.sd("fittings") * scale)[2::3]
     sizes = np.abs([one.volume_m3 for one in found.state.fittings]) / sds
@@ -421,7 +428,7 @@ def _sizes(rows, found, quantum_m3):
 
 
 def _gain_by_chance(found, rows, quantum):
-    """What a thing gains of chi2 because rounding goes on from row to row: the largest of draws."""
+    """Largest reduction of chi2 by a fitting in simulations of correlated rounding."""
     q = np.linalg.qr(found.design / rows.sd_m3[:, None])[0]
     gains = []
     for error in rounded_again(found, rows, quantum, CHANCES):
@@ -455,9 +462,9 @@ def _is_possible(found):
 
 
 def _with_free_zero(rows, state, about):
-    """The Fit with the zero free where it stays near, and with things where they are found to be.
+    """Return the Fit with a free zero if it stays near, and with fittings at estimated positions.
 
-    Where that fails, the zero is held, or things where they were looked for; None: all fails.
+    If that fails, the zero is fixed, or the fittings keep their start positions; None if all fail.
     """
     things = {"kinks"} if state.fittings else set()
     zero = {"zero"} if len(state.seams_m) and "seams" not in state.free else set()

@@ -1,10 +1,10 @@
-"""Keep, recompute or recalibrate: what a rule and the agreement of two tables say.
+"""Verdict of a comparison by a rule and by agreement: keep, recompute or recalibrate.
 
-recalibrate  a number is beyond the limit of the rule, |E_n| is above 1, the former table is older
-             than the rule lets it become, or all volumes differ as by a zero that nobody declared
-             and that is more than the rule lets a reference height differ
-recompute    the tank itself agrees; zero, temperature, head or roof are not those of the new table
-keep         nothing differs
+recalibrate  a value exceeds the limit of the rule, |E_n| exceeds 1, or the former table is older
+             than the rule allows. Also if all volumes differ by an undeclared zero larger than the
+             limit of the rule for the reference height.
+recompute    the tank agrees; zero, temperature, head or roof differ from those of the new table
+keep         no difference
 """
 
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ from tankcal.tank.capacity import Quantity
 from tankcal.tank.rules.deviation import StatedVolume, judge_volume
 
 DAYS_OF_YEAR = 365.25
-USUAL_LIMIT_M = 5e-3  # of a zero that nobody declared, where a rule has no limit
-ON_BASIS = ("zero", "temperature", "head", "roof")  # what a new computation mends
+USUAL_LIMIT_M = 5e-3  # limit of an undeclared zero for rules without a limit
+ON_BASIS = ("zero", "temperature", "head", "roof")  # differences corrected by recomputation
 FAILED = ("fails", "guard_band")
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """The verdict, whether all of its values were read in the text itself, and its reasons."""
+    """The verdict, its reasons, and whether all its limits were verified in the rule's text."""
 
     code: str | None
     verified: bool
@@ -33,14 +33,14 @@ class Verdict:
 
 @dataclass(frozen=True)
 class WorstError:
-    """The row or delivery with the largest |E_n| of those that are judged.
+    """The judged row or delivery with the largest |E_n|.
 
     Attributes
     ----------
     E_n, at_half : float
-        With the declared c, or 0; with c = 0.5.
+        With the declared c, or c = 0; with c = 0.5.
     low_m : float or None
-        Of a delivery.
+        Lower dip of a delivery.
     high_m : float
     d_m3, U_new_m3, U_former_m3, c_limit : float
     """
@@ -56,24 +56,24 @@ class WorstError:
 
     @property
     def place(self):
-        """{name: value} of where it is, for a Reason; of a row without low_m."""
+        """{name: value} of its position, for a Reason; without low_m for a row."""
         low = {} if self.low_m is None else {"low_m": self.low_m}
         return low | {"high_m": self.high_m, "d_m3": self.d_m3}
 
 
 def tank_of_rules(facts, former, new):
-    """The kind of tank in the words of the rules."""
+    """Kind of tank in the terms of the rules."""
     if facts.kind == "vertical":
         has_roof = former.roof is not None or new.roof is not None
         return "vertical_floating_roof" if has_roof else "vertical_fixed_roof"
     return facts.kind if facts.kind in ("horizontal", "sphere") else "other"
 
 
-# ---- the numbers of a rule
+# ---- limits of a rule
 
 
 def legal_numbers(rule, tank, former, new, basis, former_U, new_U):
-    """The `LegalNumber` of each limit of a rule that is for a kind of tank."""
+    """Return the `LegalNumber` of each limit of a rule for a kind of tank."""
     found = [
         _deviation(one, basis, former_U, new_U)
         for one in rule.deviation
@@ -84,7 +84,7 @@ def legal_numbers(rule, tank, former, new, basis, former_U, new_U):
 
 
 def is_for(limit, tank):
-    """Whether a limit is for a kind of tank."""
+    """Whether a limit applies to a kind of tank."""
     return not limit.tanks or tank in limit.tanks
 
 
@@ -128,7 +128,7 @@ def _deviation(limit, basis, former_U, new_U):
 
 
 def _rows_of(limit, basis, use):
-    """(low or None, high, code) rows that a limit is judged at."""
+    """Rows (low or None, high, code) at which a limit is judged."""
     if limit.of == "capacity":
         return None, use[-1], "top"
     if limit.of == "deliveries":
@@ -166,7 +166,7 @@ def _reference_height(limit, former, new):
 
 
 def ages_of(rule, tank, former, new):
-    """The `TableAge` of each period of a rule that is for a kind of tank."""
+    """Return the `TableAge` of each period of a rule for a kind of tank."""
     years = _years_between(former.date, new.date)
     return [
         TableAge(
@@ -184,7 +184,7 @@ def ages_of(rule, tank, former, new):
 
 
 def _years_between(before, after):
-    """Years between two dates as texts; None where one is not known, or the order is wrong."""
+    """Years between two dates given as text; None if one is unknown, or the order is wrong."""
     try:
         first, last = (date.fromisoformat(str(one)[:10]) for one in (before, after))
     except ValueError:
@@ -197,13 +197,13 @@ def _years_between(before, after):
 
 
 def zero_limit_of(rule, tank):
-    """Largest zero (m) that may be taken for one without being declared: of the rule, or usual."""
+    """Largest undeclared zero, m, by the rule or by default."""
     return min((one.limit_m for one in rule.reference_height if is_for(one, tank)),
                default=USUAL_LIMIT_M)  # fmt: skip
 
 
 def decide(legal, ages, basis, worst, c, zero_limit_m):
-    """The Verdict.
+    """Return the Verdict.
 
     Parameters
     ----------
@@ -211,11 +211,11 @@ def decide(legal, ages, basis, worst, c, zero_limit_m):
     ages : sequence of TableAge
     basis : OneBasis
     worst : WorstError or None
-        None: a U is not known.
+        None: a U is unknown.
     c : float or None
         Declared correlation.
     zero_limit_m : float
-        A zero that is fitted, not declared, may be no larger: else the bottom may have changed.
+        Largest zero that may be fitted without declaration; a larger one may be a changed bottom.
     """
     steps, zero = basis.steps, basis.zero
     grave = [*_broken(legal), *_differing(worst, c)]
