@@ -31,13 +31,15 @@ def normalized_error(d, U_new, U_former, c=0.0):
     >>> [round(float(normalized_error(0.70, 0.46, 0.60, c)), 2) for c in (0, 0.5)]
     [0.93, 1.29]
     """
-    d, one, two = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (d, U_new, U_former)))
-    variance = one**2 + two**2 - 2 * c * one * two
-    least = 1e-12 * (one**2 + two**2)
+    d, new, former = np.broadcast_arrays(
+        *(np.asarray(x, dtype=float) for x in (d, U_new, U_former))
+    )
+    variance = new**2 + former**2 - 2 * c * new * former
+    least = 1e-12 * (new**2 + former**2)
     U = np.sqrt(np.where(variance > least, variance, 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = np.where(d == 0, 0.0, d / U)
-    return np.where(np.isnan(one) | np.isnan(two), np.nan, found)
+        ratio = np.where(d == 0, 0.0, d / U)
+    return np.where(np.isnan(new) | np.isnan(former), np.nan, ratio)
 
 
 def critical_correlation(d, U_new, U_former):
@@ -47,12 +49,14 @@ def critical_correlation(d, U_new, U_former):
 
     The result is -1 if |E_n| exceeds 1 for every correlation. A difference of zero gives nan.
     """
-    d, one, two = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (d, U_new, U_former)))
-    product = 2 * one * two
+    d, new, former = np.broadcast_arrays(
+        *(np.asarray(x, dtype=float) for x in (d, U_new, U_former))
+    )
+    product = 2 * new * former
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = (one**2 + two**2 - d**2) / product
-    found = np.where(found > 1, np.nan, np.maximum(found, -1.0))
-    return np.where((product > 0) & (d != 0), found, np.nan)
+        correlation = (new**2 + former**2 - d**2) / product
+    correlation = np.where(correlation > 1, np.nan, np.maximum(correlation, -1.0))
+    return np.where((product > 0) & (d != 0), correlation, np.nan)
 
 
 @dataclass(frozen=True)
@@ -218,12 +222,14 @@ def worst_by_error(basis, former_U, new_U, c, minimum_m, also=()):
     use = np.flatnonzero(basis.for_use)
     dips = basis.height_m[use]
     first = np.searchsorted(dips, dips + minimum_m - SAME_M)
-    there = np.flatnonzero(first < len(dips))
-    low, high = use[there], use[first[there]]
+    starts = np.flatnonzero(first < len(dips))
+    low, high = use[starts], use[first[starts]]
     for pair in also:
         low, high = np.append(low, pair[0]), np.append(high, pair[1])
     if not len(low) or former_U.deliveries_by is None or new_U.deliveries_by is None:
         return None
-    found = deliveries_between(basis, former_U, new_U, c, low.astype(int), high.astype(int))
-    place = int(np.argmax(np.abs(found.E_n)))
-    return deliveries_between(basis, former_U, new_U, c, found.low[place], found.high[place])
+    deliveries = deliveries_between(basis, former_U, new_U, c, low.astype(int), high.astype(int))
+    place = int(np.argmax(np.abs(deliveries.E_n)))
+    return deliveries_between(
+        basis, former_U, new_U, c, deliveries.low[place], deliveries.high[place]
+    )

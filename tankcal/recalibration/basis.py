@@ -91,7 +91,7 @@ class OneBasis:
     @property
     def saved_steps(self):
         """Return the `BasisStep` of each step."""
-        return [_saved(name, one, self.height_m) for name, one in self.steps.items()]
+        return [_saved(name, step, self.height_m) for name, step in self.steps.items()]
 
 
 def bring_to_one_basis(former, new, facts):
@@ -143,8 +143,8 @@ def rows_in_both(former, new, zero_m):
     low, high = former.height_m[0] - 1e-9, former.height_m[-1] + 1e-9
     dips = new.height_m
     inside = (dips >= low) & (dips <= high) & (dips + zero_m >= low) & (dips + zero_m <= high)
-    found = np.flatnonzero(inside)
-    if len(found) < FEWEST_ROWS:
+    rows = np.flatnonzero(inside)
+    if len(rows) < FEWEST_ROWS:
         expected = message(
             "compare_no_common_range",
             "dips from {low:g} to {high:g} m; expected some in the range of {other}, {from_m:g} to "
@@ -156,7 +156,7 @@ def rows_in_both(former, new, zero_m):
             to_m=float(former.height_m[-1]),
         )
         raise InputError(Problem(new.name, expected))
-    return found
+    return rows
 
 
 def volume_at(table, dips_m):
@@ -180,8 +180,8 @@ def interpolation_error_m3(table, dips_m):
     off = np.pad(off, 2, mode="edge")  # from the row below the first to the row above the last
     four = np.array([off[k : len(off) - 3 + k] for k in range(4)])
     smooth = four.min(axis=0)
-    one, two = four[1] - smooth, four[2] - smooth
-    kink = 2 * one * two / np.maximum(one + two, 1e-300)
+    below, above = four[1] - smooth, four[2] - smooth
+    kink = 2 * below * above / np.maximum(below + above, 1e-300)
     bound = smooth / 4 * SPARE + kink
     upper = np.clip(np.searchsorted(heights, dips_m - 1e-9), 1, len(heights) - 1)
     nearest = np.minimum(np.abs(heights[upper] - dips_m), np.abs(heights[upper - 1] - dips_m))
@@ -199,7 +199,7 @@ def _declared_zero(former, new):
 
 def _fitted_zero(former, new, facts, densities):
     """Fit the height of the new zero above the former one to the volumes: (height, u), or None."""
-    zero, found = 0.0, None
+    zero, difference = 0.0, None
     quanta = np.hypot(former.volume_quantum_m3, new.volume_quantum_m3) / np.sqrt(12)
     for _ in range(ROUNDS):
         try:
@@ -209,13 +209,13 @@ def _fitted_zero(former, new, facts, densities):
         _, _, basis = _steps(former, new, facts, densities, zero, rows, until="roof")
         dips, volumes = new.height_m[rows], new.volume_m3[rows]
         usable = _for_use(former, new, zero, dips)
-        found = adjust_difference(facts, dips, volumes - basis, volumes, quanta, usable)
-        if found is None:
+        difference = adjust_difference(facts, dips, volumes - basis, volumes, quanta, usable)
+        if difference is None:
             return None
-        zero += found.zero_m
-        if abs(found.zero_m) < SAME_ZERO_M:
+        zero += difference.zero_m
+        if abs(difference.zero_m) < SAME_ZERO_M:
             break
-    return (zero, found.u_zero_m) if abs(zero) < former.height_m[-1] else None
+    return (zero, difference.u_zero_m) if abs(zero) < former.height_m[-1] else None
 
 
 def _zero_shift(former, new, zero, fitted, rows):
@@ -317,7 +317,7 @@ def _head(former, new, facts, densities, zero, dips, basis):
         return _none(dips, "not_possible", lacking=lacking, **values)
     rings = Rings(facts.edges_m(), facts.thickness_m, facts.modulus_pa, is_first_order=False)
     zone = former.roof and former.roof.critical_m
-    zone = zone and tuple(one - zero for one in zone)
+    zone = zone and tuple(edge - zero for edge in zone)
     radii = radii_of_rows(rings, dips, basis, was.kg_m3, zone)
     added = rings.volume_m3(dips, radii, is_now.kg_m3) - rings.volume_m3(dips, radii, was.kg_m3)
     source = "read" if "read" in (was.source, is_now.source) else "declared"
@@ -341,9 +341,9 @@ def radii_of_rows(rings, dips, volumes, density, zone=None):
             inside = _beside(zone, inside, dips)
             radii[k] = radii[k - 1] if k else np.sqrt(volumes[-1] / np.pi / dips[-1])
             if len(inside) > 1:
-                one, two = inside[0], inside[-1]
-                rise = volumes[two] - head[two] - volumes[one] + head[one]
-                radii[k] = np.sqrt(max(rise, 1e-9) / np.pi / (dips[two] - dips[one]))
+                first, last = inside[0], inside[-1]
+                rise = volumes[last] - head[last] - volumes[first] + head[first]
+                radii[k] = np.sqrt(max(rise, 1e-9) / np.pi / (dips[last] - dips[first]))
         head = rings.volume_m3(dips, radii, density) - rings.volume_m3(dips, radii, 0.0)
     return radii
 
@@ -364,7 +364,7 @@ def _roof(former, new, facts, densities, zero, dips, basis):
     lacking = _lacking(("former.roof", was), ("new.roof", is_now))
     if lacking:
         return _none(dips, "not_declared", lacking=lacking)
-    displaced = [_displaced_m3(one) for one in (was, is_now)]
+    displaced = [_displaced_m3(roof) for roof in (was, is_now)]
     values = {"former": displaced[0], "new": displaced[1]}
     zone = is_now.critical_m or (was.critical_m and tuple(x - zero for x in was.critical_m))
     if displaced[0] == displaced[1]:
@@ -392,12 +392,12 @@ def _rounding(former, new, facts, densities, zero, dips, basis):
 
 
 def _for_use(former, new, zero, dips):
-    found = np.full(len(dips), True)
+    for_use = np.full(len(dips), True)
     for table, shift in ((former, zero), (new, 0.0)):
         if table.roof is not None and table.roof.critical_m is not None:
             low, high = table.roof.critical_m
-            found &= (dips + shift <= low + 1e-9) | (dips + shift >= high - 1e-9)
-    return found
+            for_use &= (dips + shift <= low + 1e-9) | (dips + shift >= high - 1e-9)
+    return for_use
 
 
 def _saved(name, step, dips):

@@ -90,7 +90,7 @@ def find_computed_rows(former):
     if quantum <= 0 or np.any(np.abs(steps[: count - 1] - step) > ROUNDING):
         return None
     volumes = former.volume_m3[:count] / quantum
-    found = []
+    candidates = []
     for long_step in USUAL_STEPS_M:
         parts = round(long_step / step)
         is_multiple = abs(parts * step - long_step) < ROUNDING
@@ -100,8 +100,10 @@ def find_computed_rows(former):
         if first is not None:
             rows = np.arange(first % parts, count, parts)
             is_certain = _is_interpolated(volumes, first, parts)
-            found.append(ComputedRows(rows, first, long_step, is_certain))
-    return max(found, key=lambda one: (one.is_certain, one.step_m), default=None)
+            candidates.append(ComputedRows(rows, first, long_step, is_certain))
+    return max(
+        candidates, key=lambda candidate: (candidate.is_certain, candidate.step_m), default=None
+    )
 
 
 def _first_linear_row(volumes, parts):

@@ -24,12 +24,14 @@ def compared_courses(facts, basis, former_U, new_U, c, sd_m3):
     if not facts.is_shell:
         return []
     difference = basis.new_m3 - basis.on_basis_m3
-    found = adjust_difference(facts, basis.height_m, difference, basis.new_m3, sd_m3, basis.for_use)
-    if found is None:
+    adjusted = adjust_difference(
+        facts, basis.height_m, difference, basis.new_m3, sd_m3, basis.for_use
+    )
+    if adjusted is None:
         return []
     new, edges = _radii(facts, basis), facts.edges_m()
-    changes = found.areas_m2 / (2 * np.pi * new)
-    rounding = found.u_areas_m2 / (2 * np.pi * new)
+    changes = adjusted.areas_m2 / (2 * np.pi * new)
+    rounding = adjusted.u_areas_m2 / (2 * np.pi * new)
     courses = []
     for k in np.flatnonzero(np.isfinite(changes)):
         parts = _u_of_tables(basis, (former_U, new_U), edges[k : k + 2], new[k])
@@ -78,8 +80,10 @@ def _u_of_tables(basis, tables, ends, radius):
         return [None for _ in tables]
     low, high = inside[:1], inside[-1:]
     volume = basis.new_m3[high[0]] - basis.new_m3[low[0]]
-    found = [radius / 2 * float(one.deliveries(low, high)[0]) / one.k / volume for one in tables]
-    return [None if np.isnan(one) else one for one in found]
+    uncertainties = [
+        radius / 2 * float(table.deliveries(low, high)[0]) / table.k / volume for table in tables
+    ]
+    return [None if np.isnan(u) else u for u in uncertainties]
 
 
 def _u_of_change(former, new, c):

@@ -45,12 +45,12 @@ def _density_of(table, facts):
     if not facts.has_plates:
         return Density()
     try:
-        found = read_upright(
+        geometry = read_upright(
             _thinned(table), facts.heights_m, facts.thickness_m, modulus_pa=facts.modulus_pa
         )
     except SolutionError:
         return Density()
-    read, head = found.density_kg_m3, found.head
+    read, head = geometry.density_kg_m3, geometry.head
     known = {"with": float(read.value), "without": 0.0, "undecided": None}[head]
     source = None if known is None else "read"
     return Density(known, source, float(read.u), float(read.value), head)

@@ -60,31 +60,31 @@ def adjust_difference(facts, dips_m, difference_m3, volume_m3, sd_m3, usable):
     """
     area = slopes_m2(dips_m, volume_m3, sd_m3)
     columns = _columns(facts, dips_m, volume_m3, area)
-    taken = usable & _above_bottom(facts, dips_m, area)
-    reached = (np.abs(columns[taken]) > 1e-9).any(axis=0)
+    rows = usable & _above_bottom(facts, dips_m, area)
+    reached = (np.abs(columns[rows]) > 1e-9).any(axis=0)
     columns = columns[:, reached]
-    if taken.sum() < columns.shape[1] + SPARE_ROWS:
+    if rows.sum() < columns.shape[1] + SPARE_ROWS:
         return None
     sd = max(sd_m3, FINEST * float(volume_m3[-1]))
-    size = np.abs(columns[taken]).max(axis=0)
-    design, value = columns[taken] / size, difference_m3[taken]
+    size = np.abs(columns[rows]).max(axis=0)
+    design, value = columns[rows] / size, difference_m3[rows]
     normal = design.T @ design
     if np.linalg.cond(normal) > 1e12:
         return None
     inverse = np.linalg.inv(normal)
-    found = inverse @ (design.T @ value)
-    left = value - design @ found
-    dof = len(value) - len(found)
+    solution = inverse @ (design.T @ value)
+    left = value - design @ solution
+    dof = len(value) - len(solution)
     variance = max(sd**2, float(left @ left) / dof)
     u = np.sqrt(variance * np.diag(inverse)) / size
     areas = np.full((2, len(reached) - 1), np.nan)
-    areas[:, reached[1:]] = found[1:] / size[1:], u[1:]
+    areas[:, reached[1:]] = solution[1:] / size[1:], u[1:]
     return Difference(
-        zero_m=float(found[0] / size[0]),
+        zero_m=float(solution[0] / size[0]),
         u_zero_m=float(u[0]),
         areas_m2=areas[0],
         u_areas_m2=areas[1],
-        lowest_m=float(dips_m[taken][0]),
+        lowest_m=float(dips_m[rows][0]),
         left_m3=float(np.sqrt(np.mean(left**2))),
     )
 

@@ -89,7 +89,7 @@ def find_fittings(dips_m, left_m3, design, sd_m3, longest_m=np.inf, most=4):
     gain = np.where(is_told, along**2 / np.where(is_told, apart, 1.0), 0.0)
     slopes = along / np.where(is_told, apart, 1.0)
     likely = np.where(slopes > 0, GIVING * gain, gain)
-    found = []
+    fittings = []
     for _ in range(most):
         low, high = (int(k) for k in np.unravel_index(np.argmax(likely), gain.shape))
         if likely[low, high] <= 0:
@@ -102,8 +102,8 @@ def find_fittings(dips_m, left_m3, design, sd_m3, longest_m=np.inf, most=4):
         likely[near] = 0.0
         low, high = _standing(gain, low, high, slopes[low, high])
         volume = float(slopes[low, high] * height[low, high])
-        found.append((Fitting(float(places[low]), float(places[high]), volume), best))
-    return found
+        fittings.append((Fitting(float(places[low]), float(places[high]), volume), best))
+    return fittings
 
 
 def _standing(gain, low, high, slope):
@@ -124,9 +124,9 @@ def in_other_pairs(fittings, near_m, least_share):
     ignored.
     """
     kinks = []
-    for one in fittings:
-        slope = one.volume_m3 / max(one.top_m - one.bottom_m, 1e-9)
-        kinks += [(one.bottom_m, slope), (one.top_m, -slope)]
+    for fitting in fittings:
+        slope = fitting.volume_m3 / max(fitting.top_m - fitting.bottom_m, 1e-9)
+        kinks += [(fitting.bottom_m, slope), (fitting.top_m, -slope)]
     largest = max((abs(slope) for _, slope in kinks), default=0.0)
     joined = []
     for dip, slope in sorted(kinks):
@@ -137,6 +137,6 @@ def in_other_pairs(fittings, near_m, least_share):
     real = [(dip, slope) for dip, slope in joined if abs(slope) > least_share * largest]
     pairs = zip(real[::2], real[1::2], strict=False)
     return tuple(
-        Fitting(low, high, (slope - other) / 2 * (high - low))
-        for (low, slope), (high, other) in pairs
+        Fitting(low, high, (slope - high_slope) / 2 * (high - low))
+        for (low, slope), (high, high_slope) in pairs
     )

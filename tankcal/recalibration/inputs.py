@@ -68,7 +68,9 @@ def compare_files(asked) -> ComparisonFile:
     log.stop_if_problems()
     if former.name == new.name:
         former, new = _with_folders((old, former), (recent, new))
-    fingerprints = tuple(sha256(rows_file(one).read_bytes()).hexdigest() for one in (old, recent))
+    fingerprints = tuple(
+        sha256(rows_file(source).read_bytes()).hexdigest() for source in (old, recent)
+    )
     return compare(former, new, rule=rule, courses=courses, fingerprints=fingerprints)
 
 
@@ -117,13 +119,13 @@ def read_shell(path, log):
 
     None after problems.
     """
-    found = read_courses(path, log)
-    if found is None:
+    courses = read_courses(path, log)
+    if courses is None:
         return None
-    if np.isnan(found.heights_m).any():
+    if np.isnan(courses.heights_m).any():
         expected = message(
             "compare_no_height",
             "heights that are not known; expected all of them: tankcal read-table finds the seams",
         )
-        log.problem(found.file, expected, None, "height_m")
-    return found.heights_m, found.thickness_m
+        log.problem(courses.file, expected, None, "height_m")
+    return courses.heights_m, courses.thickness_m

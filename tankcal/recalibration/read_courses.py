@@ -12,7 +12,9 @@ from tankcal.job.folder import read_csv
 from tankcal.job.tables import read_bytes
 from tankcal.messages import message
 
-FIELDS = tuple(replace(one, required=False) if one.name == "height_m" else one for one in COLUMNS)
+FIELDS = tuple(
+    replace(field, required=False) if field.name == "height_m" else field for field in COLUMNS
+)
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ def read_courses(path, log):
             log.problem(path.name, expected, row, "thickness_mm")
     if len(log.problems) > before:
         return None
-    heights = [np.nan if one is None else one for one in values.of("height_m")]
+    heights = [np.nan if height is None else height for height in values.of("height_m")]
     return Courses(
         path.name, tuple(values.of("course")), np.array(heights), np.array(plates) / 1000
     )

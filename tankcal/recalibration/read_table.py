@@ -145,7 +145,7 @@ def _check_heights(former, courses):
             "{seams} m, within this course; expected the height of one course",
             name=courses.names[number],
             height=float(heights[number]),
-            seams=[f"{one:.2f}" for one in seams],
+            seams=[f"{seam:.2f}" for seam in seams],
         )
         problems.append(Problem(courses.file, expected, number + 2, "height_m"))
     if problems:
@@ -182,8 +182,8 @@ def _former(path, former_toml, log):
 
 
 def _read_solid(former, kind):
-    found = fit_sphere(former) if kind == "sphere" else fit_lying(former, former.dip_from_a_m)
-    fit = found if kind == "sphere" else found.best
+    geometry = fit_sphere(former) if kind == "sphere" else fit_lying(former, former.dip_from_a_m)
+    fit = geometry if kind == "sphere" else geometry.best
     share = fit.rms_m3 / former.volume_m3[-1]
     if fit.variance_factor > 1 and share > WORST_FIT:
         raise SolutionError(
@@ -197,11 +197,11 @@ def _read_solid(former, kind):
             )
         )
     job = job_of_solid(former, fit, tank_id=_tank_of(former))
-    return TableRead(former, found, (), job, (*_of_solid(found), *_of_job(former, 0.0)))
+    return TableRead(former, geometry, (), job, (*_of_solid(geometry), *_of_job(former, 0.0)))
 
 
-def _of_solid(found):
-    fit = getattr(found, "best", found)
+def _of_solid(geometry):
+    fit = getattr(geometry, "best", geometry)
     if fit.variance_factor > 1:
         yield message(
             "read_rough_solid",
@@ -216,12 +216,12 @@ def _of_solid(found):
             "count from the bottom: they are less by that",
             below=1000 * fit.below_bottom_m,
         )
-    others = getattr(found, "not_told_apart", ())
+    others = getattr(geometry, "not_told_apart", ())
     if others:
         yield message(
             "read_other_ends",
             "these ends fit as well: {ends}",
-            ends=[one.replace("_", " ") for one in others],
+            ends=[name.replace("_", " ") for name in others],
         )
 
 
@@ -318,7 +318,7 @@ def _with_seams(former, courses):
 def _read(former, chosen, courses, e_pa, bottom_m):
     """Return the TableRead of a FormerTable from selected rows, given as a FormerTable."""
     courses, warnings, seams_known = _fitting(chosen, courses)
-    found = read_upright(
+    geometry = read_upright(
         chosen,
         courses.heights_m,
         courses.thickness_m,
@@ -326,26 +326,30 @@ def _read(former, chosen, courses, e_pa, bottom_m):
         lowest_m=bottom_m,
         seams_known=seams_known,
     )
-    u_common = _u_common_m(former, found)
+    u_common = _u_common_m(former, geometry)
     job = job_of_geometry(
-        former, found, courses.names, u_common_m=u_common, e_pa=e_pa, tank_id=_tank_of(former)
+        former, geometry, courses.names, u_common_m=u_common, e_pa=e_pa, tank_id=_tank_of(former)
     )
     if seams_known:
-        warnings = (*warnings, *_other_seams(chosen, courses, found, e_pa, bottom_m))
-    told = (*warnings, *_of_geometry(former, found, seams_known), *_of_job(former, u_common))
-    return TableRead(former, found, courses.names, job, told)
+        warnings = (*warnings, *_other_seams(chosen, courses, geometry, e_pa, bottom_m))
+    messages = (*warnings, *_of_geometry(former, geometry, seams_known), *_of_job(former, u_common))
+    return TableRead(former, geometry, courses.names, job, messages)
 
 
-def _other_seams(former, courses, found, e_pa, bottom_m):
+def _other_seams(former, courses, geometry, e_pa, bottom_m):
     """Warn if other seams explain the residuals with fewer fittings than the declared seams."""
-    declared = np.cumsum(found.heights_m)[:-1]
-    doubtful = [one for one in found.fittings if _may_be_seams(one, declared + found.zero_m.value)]
-    is_bulged = found.state.bulges_m is not None  # profiles absorb the effect of displaced seams
-    is_doubtful = is_bulged or doubtful or found.roughness > 1
-    if found.seams_are == "found" or not is_doubtful:
+    declared = np.cumsum(geometry.heights_m)[:-1]
+    doubtful = [
+        fitting
+        for fitting in geometry.fittings
+        if _may_be_seams(fitting, declared + geometry.zero_m.value)
+    ]
+    is_bulged = geometry.state.bulges_m is not None  # profiles absorb the effect of displaced seams
+    is_doubtful = is_bulged or doubtful or geometry.roughness > 1
+    if geometry.seams_are == "found" or not is_doubtful:
         return
     try:
-        other = read_upright(
+        alternative = read_upright(
             former,
             _with_seams(former, courses).heights_m,
             courses.thickness_m,
@@ -355,19 +359,22 @@ def _other_seams(former, courses, found, e_pa, bottom_m):
         )
     except TankcalError:  # no solution with other seams: the declared seams are kept
         return
-    seams = np.cumsum(other.heights_m)[:-1]
-    is_simpler = len(other.fittings) < len(found.fittings) or found.roughness > other.roughness
+    seams = np.cumsum(alternative.heights_m)[:-1]
+    is_simpler = (
+        len(alternative.fittings) < len(geometry.fittings)
+        or geometry.roughness > alternative.roughness
+    )
     if is_bulged:
-        is_simpler = other.state.bulges_m is None
-    is_as_good = other.rms_m3 <= AS_GOOD * max(found.rms_m3, found.expected_m3)
+        is_simpler = alternative.state.bulges_m is None
+    is_as_good = alternative.rms_m3 <= AS_GOOD * max(geometry.rms_m3, geometry.expected_m3)
     if is_simpler and is_as_good and np.any(abs(seams - declared) > OTHER_PLACE_M):
         yield message(
             "read_doubtful_seams",
             "the seams of courses.csv ({declared} m above the bottom) do not fit the table: with "
             "seams at {seams} m less is left over, or in the tank; check the heights of the "
             "courses, what is told of things in the tank may be none",
-            declared=[f"{one:.2f}" for one in declared],
-            seams=[f"{one:.2f}" for one in seams],
+            declared=[f"{seam:.2f}" for seam in declared],
+            seams=[f"{seam:.2f}" for seam in seams],
         )
 
 
@@ -377,13 +384,13 @@ def _may_be_seams(thing, seams):
     return ends[1] - ends[0] > LONG_M or np.any(abs(ends[:, None] - seams) < OTHER_PLACE_M)
 
 
-def _u_common_m(former, found):
+def _u_common_m(former, geometry):
     """Common standard uncertainty of all radii, from U of the former table, m; 0 if unknown."""
     if former.U_m3 is None:
         return 0.0
     upper = former.height_m > 0.5 * former.height_m[-1]
     relative = np.median(former.U_m3[upper] / former.volume_m3[upper]) / former.k
-    return float(relative * np.mean(found.radii_m) / 2)
+    return float(relative * np.mean(geometry.radii_m) / 2)
 
 
 def _tank_of(former):
@@ -392,49 +399,49 @@ def _tank_of(former):
     return str(former.name).partition(",")[0].rpartition(".")[0] or "tank"
 
 
-def _of_geometry(former, found, seams_known):
+def _of_geometry(former, geometry, seams_known):
     """Messages about the geometry that the user must consider before using the radii."""
-    if found.roughness > 1:
+    if geometry.roughness > 1:
         yield message(
             "read_rough",
             "the rows depart by {rms:.3g} L (rms) from such a tank, rounding leaves {expected:.3g} "
             "L: there is more in this table than courses, head and things in the tank; u is "
             "{factor:.3g} times that of rounding",
-            rms=1000 * found.rms_m3,
-            expected=1000 * found.expected_m3,
-            factor=found.roughness,
+            rms=1000 * geometry.rms_m3,
+            expected=1000 * geometry.expected_m3,
+            factor=geometry.roughness,
         )
-    yield from _of_density(former.liquid_density_kg_m3, found)
-    if found.state.bulges_m is not None:
+    yield from _of_density(former.liquid_density_kg_m3, geometry)
+    if geometry.state.bulges_m is not None:
         yield message(
             "read_bulges",
             "the courses bulge, up to {largest:.2g} mm from their mean radius: profiles of the "
             "courses are estimated, too, and less is known of head, zero and things in the tank",
-            largest=1000 * largest_bulge_m(found.state.bulges_m),
+            largest=1000 * largest_bulge_m(geometry.state.bulges_m),
         )
-    if found.seams_are == "found" and seams_known:
+    if geometry.seams_are == "found" and seams_known:
         yield message(
             "read_other_seams",
             "the seams are not where courses.csv has them; the radii are for the seams that were "
             "found",
         )
     total = float(former.volume_m3[-1])
-    for one in found.fittings:
-        if -one.volume_m3.value > LARGE_SHARE * total and former.roof is None:
+    for fitting in geometry.fittings:
+        if -fitting.volume_m3.value > LARGE_SHARE * total and former.roof is None:
             yield message(
                 "read_like_roof",
                 "{volume:.4g} m3 less from {bottom:.3f} to {top:.3f} m: is that a floating roof? "
                 "Its mass is needed then ([roof] of former.toml)",
-                volume=-one.volume_m3.value,
-                bottom=one.bottom_m.value,
-                top=one.top_m.value,
+                volume=-fitting.volume_m3.value,
+                bottom=fitting.bottom_m.value,
+                top=fitting.top_m.value,
             )
 
 
-def _of_density(declared, found):
+def _of_density(declared, geometry):
     """Compare the estimated density of the head with liquids and with the declared density."""
-    density = found.density_kg_m3
-    held = found.state.density_kg_m3
+    density = geometry.density_kg_m3
+    held = geometry.state.density_kg_m3
     if not is_possible(density):
         yield message(
             "read_strange_density",
@@ -444,7 +451,7 @@ def _of_density(declared, found):
             u=density.u,
             held=held,
         )
-    value = 0.0 if found.head == "without" else density.value
+    value = 0.0 if geometry.head == "without" else density.value
     if declared is None or abs(declared - value) <= 3 * density.u + 0.001 * declared:
         return
     if abs(held - declared) <= 3 * DECLARED_SD_KG_M3:

@@ -120,7 +120,7 @@ def _rows(path, declared, log):
     except InputError as error:
         log.problems += error.problems[:MOST_FINDINGS]
         return None, ()
-    errors = [one.problem for one in report.findings if one.severity == "error"]
+    errors = [finding.problem for finding in report.findings if finding.severity == "error"]
     if errors:
         expected = message(
             "former_is_wrong",
@@ -131,7 +131,7 @@ def _rows(path, declared, log):
         log.problem(path.name, expected)
         log.problems += errors[:MOST_FINDINGS]
         return None, ()
-    return rows, tuple(one.problem for one in report.findings)
+    return rows, tuple(finding.problem for finding in report.findings)
 
 
 def _record(path):
@@ -239,15 +239,15 @@ def _of_record(path, record, declared, log):
         "dip_from_a_m": (job.get("horizontal") or {}).get("dip_from_a_m"),
     }
     for key in _RECORD_VALUES:
-        said = declared[key]
+        stated = declared[key]
         if values[key] is None:
-            values[key] = said
-        elif said is not None and not _same(said, values[key]):
+            values[key] = stated
+        elif stated is not None and not _same(stated, values[key]):
             expected = message(
                 "former_against_record",
                 "found {found}, but the record has {has}; expected no such key: it is taken from "
                 "the record",
-                found=str(said),
+                found=str(stated),
                 has=str(values[key]),
             )
             declared.tell(log, key, expected)
@@ -303,18 +303,18 @@ def _factor_of(table, path, log):
 
 
 def _choices(record):
-    return {one["code"]: one["value"] for one in record["choices"]}
+    return {choice["code"]: choice["value"] for choice in record["choices"]}
 
 
-def _same(said, has):
-    if isinstance(said, int | float) and isinstance(has, int | float):
-        return abs(said - has) <= 1e-9 * max(abs(said), abs(has))
-    return said == has
+def _same(stated, has):
+    if isinstance(stated, int | float) and isinstance(has, int | float):
+        return abs(stated - has) <= 1e-9 * max(abs(stated), abs(has))
+    return stated == has
 
 
 def _roof_of(record):
     """Return the FormerRoof deducted in the record's table, or None."""
-    details = {one["code"]: one["value"] for one in record.get("roof") or ()}
+    details = {roof["code"]: roof["value"] for roof in record.get("roof") or ()}
     if not details or _choices(record).get("roof") == "off":
         return None
     critical = details.get("roof_critical_bottom"), details.get("roof_critical_top")

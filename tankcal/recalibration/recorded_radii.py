@@ -66,15 +66,15 @@ def read_recorded(former):
         )
         _refuse(former, expected)
     zero = record["capacity"].get("zero_m") or 0.0
-    radii = np.array([one["inside_radius_m"] for one in courses])
-    parts = [_by_rows(former, one, zero) for one in courses]
+    radii = np.array([course["inside_radius_m"] for course in courses])
+    parts = [_by_rows(former, course, zero) for course in courses]
     factor = np.array(parts) / (2 * np.pi * radii[:, None])
     return RecordedRadii(
-        tuple(one["course"] for one in courses),
+        tuple(course["course"] for course in courses),
         radii,
         factor @ factor.T,
-        np.array([one["height_m"] for one in courses]),
-        np.array([one["thickness_m"] for one in courses]),
+        np.array([course["height_m"] for course in courses]),
+        np.array([course["thickness_m"] for course in courses]),
     )
 
 

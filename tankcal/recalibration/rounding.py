@@ -20,56 +20,56 @@ def sd_of_rows(former):
     """
     dips, volumes = former.height_m, former.volume_m3
     finest = 1e-7 + 1e-12 * float(np.abs(volumes).max())
-    own = max(former.volume_quantum_m3, finest) / np.sqrt(12)
+    sd = max(former.volume_quantum_m3, finest) / np.sqrt(12)
     if former.height_rounding_m is None:
-        return np.full(len(dips), own)
-    return np.hypot(own, np.gradient(volumes, dips) * former.height_rounding_m / np.sqrt(3))
+        return np.full(len(dips), sd)
+    return np.hypot(sd, np.gradient(volumes, dips) * former.height_rounding_m / np.sqrt(3))
 
 
-def rounded_again(found, rows, quantum_m3, draws=DRAWS):
+def rounded_again(solution, rows, quantum_m3, draws=DRAWS):
     """Rounding errors (draws, rows) of tanks compatible with a Fit, m3."""
-    sds = np.sqrt(np.diag(found.cofactor))
+    sds = np.sqrt(np.diag(solution.cofactor))
     random = np.random.default_rng(SEED)
     safe = np.where(sds > 0, sds, 1.0)
-    values, vectors = np.linalg.eigh(found.cofactor / np.outer(safe, safe))
+    values, vectors = np.linalg.eigh(solution.cofactor / np.outer(safe, safe))
     roots = vectors * np.sqrt(np.maximum(values, 0)) * safe[:, None]
-    moves = random.normal(size=(draws, len(sds))) @ (found.design @ roots).T
+    moves = random.normal(size=(draws, len(sds))) @ (solution.design @ roots).T
     shifts = random.uniform(0, 1, (draws, 1))
-    places = (found.state.volume_m3(rows.dip_m) + moves) / quantum_m3 + shifts
+    places = (solution.state.volume_m3(rows.dip_m) + moves) / quantum_m3 + shifts
     return (np.round(places) - places) * quantum_m3
 
 
-def scale_of_u(found, rows, quantum_m3):
+def scale_of_u(solution, rows, quantum_m3):
     """Factors (u,) of the standard deviations of the unknowns of a Fit, 1 or more.
 
     Parameters
     ----------
-    found : Fit
+    solution : Fit
     rows : Rows
     quantum_m3 : float
         Value of the last printed digit; 0: not rounded.
     """
-    return np.maximum(_by_steps(found, rows, quantum_m3), roughness(found, rows))
+    return np.maximum(_by_steps(solution, rows, quantum_m3), roughness(solution, rows))
 
 
-def _by_steps(found, rows, quantum):
-    sds = np.sqrt(np.diag(found.cofactor))
-    if quantum <= 0 or found.dof <= 0:
+def _by_steps(solution, rows, quantum):
+    sds = np.sqrt(np.diag(solution.cofactor))
+    if quantum <= 0 or solution.dof <= 0:
         return np.ones(len(sds))
-    gain = found.cofactor @ (found.design / rows.sd_m3[:, None] ** 2).T
-    errors = rounded_again(found, rows, quantum) @ gain.T
+    gain = solution.cofactor @ (solution.design / rows.sd_m3[:, None] ** 2).T
+    errors = rounded_again(solution, rows, quantum) @ gain.T
     moved = np.sqrt(np.mean(errors**2, axis=0))
     return np.maximum(moved / np.where(sds > 0, sds, np.inf), 1.0)
 
 
-def roughness(found, rows):
+def roughness(solution, rows):
     """Factor of u: 1, or more if the residuals exceed the rounding errors.
 
     Correlated residuals count as fewer rows: a correlation c of neighbours gives the factor
     sqrt((1 + c) / (1 - c)).
     """
-    left = found.left_m3 / rows.sd_m3
-    size = np.sqrt(found.chi2 / found.dof) if found.dof > 0 else 1.0
+    left = solution.left_m3 / rows.sd_m3
+    size = np.sqrt(solution.chi2 / solution.dof) if solution.dof > 0 else 1.0
     if size < ROUGH:
         return 1.0
     c = np.clip(left[1:] @ left[:-1] / (left @ left), 0.0, 0.99)

@@ -95,9 +95,9 @@ def _chi2(dips, volumes, sds, seams):
         above = np.maximum(x - seam / dips[-1], 0.0)
         columns += [above, above**2]
     basis = np.column_stack(columns) / sds[:, None]
-    found = np.linalg.lstsq(basis, volumes / sds, rcond=None)[0]
-    left = volumes / sds - basis @ found
-    return float(left @ left), found[3::2]
+    solution = np.linalg.lstsq(basis, volumes / sds, rcond=None)[0]
+    left = volumes / sds - basis @ solution
+    return float(left @ left), solution[3::2]
 
 
 def _gains(dips, volumes, sds, seams, places):

@@ -155,13 +155,13 @@ class WetRows:
 
 def flat_start(rows):
     """Return (D, L, 0) of the flat-ended tank with the nearest volumes, D on a grid."""
-    found = []
+    candidates = []
     for part in np.append(np.linspace(0.98, 2.0, 103), np.geomspace(2.05, HIGHEST_PART, 60)):
         diameter = part * rows.height[-1]
         unit = _volumes(LyingTank(diameter, diameter, 1.0), rows.height)
         length = float(unit @ rows.volume / (unit @ unit))
-        found.append((np.sum((length * unit - rows.volume) ** 2), diameter, length))
-    _, diameter, length = min(found)
+        candidates.append((np.sum((length * unit - rows.volume) ** 2), diameter, length))
+    _, diameter, length = min(candidates)
     return diameter, length, 0.0
 
 

@@ -125,11 +125,11 @@ def fit_lying(former: FormerTable, dip_from_a_m: float | None = None) -> LyingGe
     best, worse = _chosen(fits)
     if best.variance_factor > 1:  # a tilt may explain residuals that no form of ends explains
         leaning = {
-            name: fit_ends(rows, name, *one.values[:3], dip_from_a_m, one.values[3:], TILTS[-1])
-            for name, one in fits.items()
+            name: fit_ends(rows, name, *fit.values[:3], dip_from_a_m, fit.values[3:], TILTS[-1])
+            for name, fit in fits.items()
         }
-        leaning = {name: one for name, one in leaning.items() if one is not None}
-        if any(one.variance_factor == 1 for one in leaning.values()):
+        leaning = {name: fitted for name, fitted in leaning.items() if fitted is not None}
+        if any(fitted.variance_factor == 1 for fitted in leaning.values()):
             fits = leaning
             best, worse = _chosen(fits)
     _refuse_low_rows(former, rows, [fits[name] for name, by in worse.items() if by < TOLD_APART])
@@ -141,7 +141,7 @@ def fit_lying(former: FormerTable, dip_from_a_m: float | None = None) -> LyingGe
 
 def _refuse_low_rows(former, rows, fits):
     """Raise SolutionError if tanks of very different diameters fit equally well."""
-    diameters = [float(one.values[0]) for one in fits]
+    diameters = [float(fit.values[0]) for fit in fits]
     if max(diameters) > LARGEST_RATIO * min(diameters):
         raise SolutionError(
             message(
@@ -166,26 +166,26 @@ def _level_fits(rows, dip_from_a_m):
         if name != "flat":
             shorter = max(length - 1.2 * part * diameter, 0.2 * length)
             fits[name] = fit_ends(rows, name, diameter, shorter, zero, dip_from_a_m)
-    return {name: one for name, one in fits.items() if one is not None}
+    return {name: fit for name, fit in fits.items() if fit is not None}
 
 
 def _chosen(fits):
     """Return the SolidFit with the fewest unknowns among equally good fits, and {ends: excess}."""
-    least = min(fits.values(), key=lambda one: one.chi2)
-    worse = {name: (one.chi2 - least.chi2) / least.variance_factor for name, one in fits.items()}
+    least = min(fits.values(), key=lambda fit: fit.chi2)
+    worse = {name: (fit.chi2 - least.chi2) / least.variance_factor for name, fit in fits.items()}
     same = [name for name, by in worse.items() if by < TOLD_APART]
     chosen = min(same, key=lambda name: (len(fits[name].names), worse[name]))
-    return fits[chosen], dict(sorted(worse.items(), key=lambda one: one[1]))
+    return fits[chosen], dict(sorted(worse.items(), key=lambda entry: entry[1]))
 
 
-def _again(rows, one, dip_from_a_m):
+def _again(rows, fitted, dip_from_a_m):
     """Repeat a fit with other rows; of two mirrored tilts, return the one with the smaller zero."""
-    (diameter, length, zero), rest, tilt = one.values[:3], one.values[3:], None
-    if "tilt" in one.names:
-        rest, tilt = one.values[3:-1], one.values[-1]
-        if abs(one.mirrored[1]) < abs(zero):
-            tilt, zero = one.mirrored
-    return fit_ends(rows, one.ends, diameter, length, zero, dip_from_a_m, rest, tilt)
+    (diameter, length, zero), rest, tilt = fitted.values[:3], fitted.values[3:], None
+    if "tilt" in fitted.names:
+        rest, tilt = fitted.values[3:-1], fitted.values[-1]
+        if abs(fitted.mirrored[1]) < abs(zero):
+            tilt, zero = fitted.mirrored
+    return fit_ends(rows, fitted.ends, diameter, length, zero, dip_from_a_m, rest, tilt)
 
 
 def _tilt(rows, all_rows, best, whole, dip_from_a_m):
@@ -196,11 +196,11 @@ def _tilt(rows, all_rows, best, whole, dip_from_a_m):
         sizes, rest = values[:3], values[3:count]
         return fit_ends(rows, best.ends, *sizes, dip_from_a_m, rest, tilt, is_held)
 
-    found = [best] if "tilt" in best.names else [fit(best.values, tilt) for tilt in TILTS]
-    found = [one for one in found if one is not None]
-    if not found:
+    fits = [best] if "tilt" in best.names else [fit(best.values, tilt) for tilt in TILTS]
+    fits = [fitted for fitted in fits if fitted is not None]
+    if not fits:
         return None, 0.0, (0.0, LARGEST_TILT)
-    near = min(found, key=lambda one: one.chi2)
+    near = min(fits, key=lambda fitted: fitted.chi2)
     level, is_best = fit(near.values, 0.0, True), near is best
     if not is_best and not _is_told(near, best):
         near = best
@@ -208,8 +208,8 @@ def _tilt(rows, all_rows, best, whole, dip_from_a_m):
 
     def is_near(size):
         sign = near.values[-1] if "tilt" in near.names else 1.0
-        one = fit(near.values, np.copysign(size, sign), True)
-        return one is not None and one.chi2 < limit
+        held = fit(near.values, np.copysign(size, sign), True)
+        return held is not None and held.chi2 < limit
 
     tilted = whole if is_best else _again(all_rows, near, dip_from_a_m)
     if "tilt" not in near.names or not (is_best or _is_told(tilted, whole)):

@@ -86,8 +86,8 @@ class State:
         dips = np.append(dips_m, self.lowest_m)
         shell = self.shell_m3(dips)
         volume = self.base_m3 + shell[:-1] - shell[-1]
-        for one in self.fittings:
-            below = one.volume_below_m3(dips)
+        for fitting in self.fittings:
+            below = fitting.volume_below_m3(dips)
             volume = volume + below[:-1] - below[-1]
         return volume + self._roof_share(dips_m) * self.roof_m3
 
@@ -143,18 +143,18 @@ class State:
 
     def with_unknowns(self, unknowns):
         """Return the state with other values of the unknowns."""
-        given = {name: unknowns[part] for name, part in self.layout.items()}
-        changes = {"radii_m": given["radii"]}
+        values = {name: unknowns[part] for name, part in self.layout.items()}
+        changes = {"radii_m": values["radii"]}
         for name, key in (("base", "base_m3"), ("density", "density_kg_m3"), ("zero", "zero_m"),
                           ("roof", "roof_m3")):  # fmt: skip
-            if len(given[name]):
-                changes[key] = float(given[name][0])
-        if len(given["seams"]):
-            changes["seams_m"] = given["seams"]
+            if len(values[name]):
+                changes[key] = float(values[name][0])
+        if len(values["seams"]):
+            changes["seams_m"] = values["seams"]
         if self.bulges_m is not None:
-            changes["bulges_m"] = given["bulges"].reshape(self.bulges_m.shape)
-        things = given["fittings"].reshape(-1, 3)
-        changes["fittings"] = tuple(Fitting(*map(float, one)) for one in things)
+            changes["bulges_m"] = values["bulges"].reshape(self.bulges_m.shape)
+        things = values["fittings"].reshape(-1, 3)
+        changes["fittings"] = tuple(Fitting(*map(float, fitting)) for fitting in things)
         return replace(self, **changes)
 
     def design(self, dips_m):
@@ -167,7 +167,8 @@ class State:
         if self.bulges_m is not None:
             by_bulge, *more = bulge_derivatives(self.rings, dips, self.radii_m, self.bulges_m)
             by_radius, by_edge, by_zero = (
-                one + also for one, also in zip((by_radius, by_edge, by_zero), more, strict=True)
+                derivatives + also
+                for derivatives, also in zip((by_radius, by_edge, by_zero), more, strict=True)
             )
         columns = [by_radius]
         if "density" in self.free:
@@ -177,7 +178,7 @@ class State:
         if "seams" in self.free:
             columns.append(by_edge[:, 1:])
         columns += [by_bulge]
-        columns += [one.derivatives(dips) for one in self.fittings]
+        columns += [fitting.derivatives(dips) for fitting in self.fittings]
         relative = np.hstack(columns)
         parts = [relative[:-1] - relative[-1]]
         if "base" in self.free:
@@ -261,10 +262,10 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     now, w = state, misclosure(state)
     for _ in range(MOST_ROUNDS):
         design = np.vstack([now.design(dips_m)[:, moving], rows])
-        found = adjust(_tangent(w, design), np.zeros(len(moving)), np.zeros(len(w)), variances)
+        adjusted = adjust(_tangent(w, design), np.zeros(len(moving)), np.zeros(len(w)), variances)
         before, cost = now, w @ (w / variances)
         step = np.zeros(len(now.unknowns))
-        step[moving] = found.unknowns
+        step[moving] = adjusted.unknowns
         for _ in range(MOST_HALVINGS):
             now = before.with_unknowns(before.unknowns + step)
             w = misclosure(now)
@@ -274,7 +275,7 @@ def fit(state, dips_m, volumes_m3, sd_m3):
         if abs(cost - w @ (w / variances)) < SETTLED:
             break
     cofactor = np.zeros((len(state.unknowns), len(state.unknowns)))
-    cofactor[np.ix_(moving, moving)] = found.cofactor
+    cofactor[np.ix_(moving, moving)] = adjusted.cofactor
     left = volumes_m3 - now.volume_m3(dips_m)
     chi2 = float(np.sum((left / sd_m3) ** 2))
     bulges = _expected_bulges(now)
@@ -305,9 +306,9 @@ def _priors(state):
     if state.bulges_m is not None:
         places = range(layout["bulges"].start, layout["bulges"].stop)
         sds |= dict(zip(places, prior_sds(state.bulges_m).ravel(), strict=True))
-    for k, one in enumerate(state.fittings):
+    for k, fitting in enumerate(state.fittings):
         place = layout["fittings"].start + 3 * k
-        for edge, is_held in enumerate(held_kinks(state, one)):
+        for edge, is_held in enumerate(held_kinks(state, fitting)):
             if is_held:
                 held.append(place + edge)
             else:

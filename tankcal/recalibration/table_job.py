@@ -40,13 +40,13 @@ class JobOfTable:
     words: tuple = ()
 
 
-def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
+def job_of_geometry(former, geometry, names, *, u_common_m, e_pa, tank_id):
     """Return the `JobOfTable` of an `UprightGeometry`.
 
     Parameters
     ----------
     former : FormerTable
-    found : UprightGeometry
+    geometry : UprightGeometry
     names : sequence of str
         Names of the courses.
     u_common_m : float
@@ -54,14 +54,16 @@ def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
     e_pa : float
     tank_id : str
     """
-    density = 0.0 if found.head == "without" else found.state.density_kg_m3
-    zero, bottom = _bottom(former, found)
-    heights = found.heights_m + np.eye(1, len(found.heights_m))[0] * (found.zero_m.value - zero)
+    density = 0.0 if geometry.head == "without" else geometry.state.density_kg_m3
+    zero, bottom = _bottom(former, geometry)
+    heights = geometry.heights_m + np.eye(1, len(geometry.heights_m))[0] * (
+        geometry.zero_m.value - zero
+    )
     note = message("job_read_from", "read from {name}", name=str(former.name))
     settings = _settings(
         former,
         tank_id=tank_id,
-        diameter=2 * float(found.radii_m[0]),
+        diameter=2 * float(geometry.radii_m[0]),
         height=float(np.sum(heights)),
         zero=zero,
         density=round(density, 1),
@@ -72,11 +74,11 @@ def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
     )
     texts = {
         "job.toml": settings + _roof(former),
-        **_wall(names, heights, found.thickness_m, found.radii_m),
+        **_wall(names, heights, geometry.thickness_m, geometry.radii_m),
     }
     if bottom is not None:
         texts["bottom.csv"] = _csv(("level_m", "volume_m3"), bottom, (5, 6))
-    things = _deadwood(found, zero + float(np.sum(heights)))
+    things = _deadwood(geometry, zero + float(np.sum(heights)))
     names_of_things = [
         message("job_thing", "thing-{number}", number=k) for k in range(1, len(things) + 1)
     ]
@@ -84,10 +86,10 @@ def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
         rows = [(name, *thing) for name, thing in zip(names_of_things, things, strict=True)]
         heading = ("name", "bottom_m", "top_m", "volume_m3", "u_m3")
         texts["deadwood.csv"] = "\n".join(map(",".join, [heading, *rows])) + "\n"
-    if found.state.bulges_m is not None:
-        texts["uncertainty.csv"] = _profiles(found.state.bulges_m)
+    if geometry.state.bulges_m is not None:
+        texts["uncertainty.csv"] = _profiles(geometry.state.bulges_m)
     words = (note, *names_of_things)
-    return JobOfTable(texts, found.covariance_m2, tuple(names), words)
+    return JobOfTable(texts, geometry.covariance_m2, tuple(names), words)
 
 
 def job_of_record(former, radii, *, tank_id):
@@ -247,29 +249,29 @@ def _profiles(bulges_m):
     return "\n".join(["input,u,unit", *rows]) + "\n"
 
 
-def _deadwood(found, top_m):
+def _deadwood(geometry, top_m):
     """Return rows of deadwood.csv: bottom, top, volume, u of each fitting within the rows used.
 
     The volume below the lowest row used belongs to the bottom. The part of a fitting above the last
     row is not observed and is left out.
     """
     rows = []
-    for one in found.fittings:
-        low, high = max(one.bottom_m.value, found.lowest_m), min(one.top_m.value, top_m)
-        share = (high - low) / max(one.top_m.value - one.bottom_m.value, 1e-9)
+    for fitting in geometry.fittings:
+        low, high = max(fitting.bottom_m.value, geometry.lowest_m), min(fitting.top_m.value, top_m)
+        share = (high - low) / max(fitting.top_m.value - fitting.bottom_m.value, 1e-9)
         if high - low > LOWEST_THING_M:
-            volume, u = share * one.volume_m3.value, share * one.volume_m3.u
+            volume, u = share * fitting.volume_m3.value, share * fitting.volume_m3.u
             rows.append((f"{low:.4f}", f"{high:.4f}", f"{volume:.5f}", f"{u:.5f}"))
     return rows
 
 
-def _bottom(former, found):
+def _bottom(former, geometry):
     """Return the dip of the bottom of the first ring, and the bottom below the lowest row used.
 
     The bottom is flat if a zero within its uncertainty explains every row; the second result is
     then None. Otherwise the second result is (rows, 2) dips and volumes up to the lowest row used.
     """
-    base, lowest, zero, state = found.base_m3, found.lowest_m, found.zero_m, found.state
+    base, lowest, zero, state = geometry.base_m3, geometry.lowest_m, geometry.zero_m, geometry.state
     shell = state.shell_m3(np.array([lowest]))[0]
     area = np.pi * state.radii_m[0] ** 2
     level = zero.value + (shell - base.value) / area
@@ -277,8 +279,8 @@ def _bottom(former, found):
     dips, volumes = former.height_m[below], former.volume_m3[below]
     flat = area * np.maximum(dips - level, 0.0)
     u = zero.u if np.isfinite(zero.u) else UNKNOWN_ZERO_M
-    is_near = abs(level - zero.value) <= SURE * (u + found.expected_m3 / area)
-    if is_near and np.all(np.abs(volumes - flat) < SURE * found.expected_m3):
+    is_near = abs(level - zero.value) <= SURE * (u + geometry.expected_m3 / area)
+    if is_near and np.all(np.abs(volumes - flat) < SURE * geometry.expected_m3):
         return level, None
     rows = _rising([*zip(dips, volumes, strict=True), (lowest, max(base.value, 0.0))])
     floor = (

@@ -64,34 +64,36 @@ def facts_of(former, new, courses=None):
         Declared courses, m, used if no record has them.
     """
     kind = new.kind or former.kind or ("vertical" if courses is not None else None)
-    given = {"kind": kind}
+    facts = {"kind": kind}
     if courses is not None:
-        given |= _shell(*courses)
+        facts |= _shell(*courses)
     for table in (former, new):  # the new table last, so that it takes precedence
         if table.record is not None:
-            given |= _of_record(table.record, is_new=table is new)
-    return TankFacts(**given)
+            facts |= _of_record(table.record, is_new=table is new)
+    return TankFacts(**facts)
 
 
 def _of_record(record, is_new):
     job = record["job"]
     material, table = job.get("material") or {}, job.get("table") or {}
-    found = {"dips_expand": bool(table.get("height_expansion"))}
+    facts = {"dips_expand": bool(table.get("height_expansion"))}
     if material.get("e_pa") and material.get("expansion_per_k"):
-        found |= {
+        facts |= {
             "modulus_pa": float(material["e_pa"]),
             "expansion_per_k": float(material["expansion_per_k"]),
             "material_is": "record",
         }
     courses = job.get("courses") or []
     if courses:
-        found |= _shell(*([one[key] for one in courses] for key in ("height_m", "thickness_m")))
+        facts |= _shell(
+            *([course[key] for course in courses] for key in ("height_m", "thickness_m"))
+        )
         if is_new:
-            found["bottom_m"] = -float(record["capacity"]["zero_m"])
+            facts["bottom_m"] = -float(record["capacity"]["zero_m"])
             surveyed = record.get("courses") or []
             if len(surveyed) == len(courses):
-                found["inside_m"] = np.array([one["inside_radius_m"] for one in surveyed], float)
-    return found
+                facts["inside_m"] = np.array([key["inside_radius_m"] for key in surveyed], float)
+    return facts
 
 
 def _shell(heights_m, thickness_m):

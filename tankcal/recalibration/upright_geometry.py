@@ -169,7 +169,9 @@ def read_upright(
         If there are too few rows, or they do not determine the radii.
     """
     heights, plates = np.asarray(heights_m, float), np.asarray(thickness_m, float)
-    volume = former.volume_m3 - sum((one.volume_below_m3(former.height_m) for one in known), 0.0)
+    volume = former.volume_m3 - sum(
+        (fitting.volume_below_m3(former.height_m) for fitting in known), 0.0
+    )
     rows = Rows(former.height_m, volume, sd_of_rows(former))
     zone = former.roof.critical_m if former.roof else None
     used = np.ones(len(volume), dtype=bool)
@@ -180,9 +182,9 @@ def read_upright(
         used &= ~empty
     usable = rows.of(used)
     state = _start(usable, heights, plates, modulus_pa, zone)
-    found = search(usable, state, lowest_m, _usual_density(former))
-    used &= rows.dip_m >= found.state.lowest_m - 1e-9
-    return _geometry(former, found, rows, used, seams_known)
+    solution = search(usable, state, lowest_m, _usual_density(former))
+    used &= rows.dip_m >= solution.state.lowest_m - 1e-9
+    return _geometry(former, solution, rows, used, seams_known)
 
 
 def _start(rows, heights, plates, modulus, zone):
@@ -220,114 +222,114 @@ def _start(rows, heights, plates, modulus, zone):
     )
 
 
-def _geometry(former, found, rows, used, seams_known):
+def _geometry(former, solution, rows, used, seams_known):
     chosen = rows.of(used)
     quantum = former.volume_quantum_m3
-    found = _with_known_zero(chosen, former, found)
-    is_bulged = found.state.bulges_m is not None
-    other = seams = None
+    solution = _with_known_zero(chosen, former, solution)
+    is_bulged = solution.state.bulges_m is not None
+    other_order = seams = None
     if not is_bulged:
-        found, other = _with_order(chosen, with_sure_fittings(chosen, found, quantum))
-        seams = found if "seams" in found.state.free else _free_seams(chosen, found)
-    if seams is not None and (not seams_known or _are_elsewhere(found, seams)):
-        found = seams = without_phantoms(chosen, seams, quantum)
-    seams_are = "found" if "seams" in found.state.free else "declared"
-    scale = scale_of_u(found, chosen, quantum)
-    layout, by_order = found.state.layout, _by_order(found, other)
-    u_density = float(np.hypot((found.sd("density") * scale[layout["density"]])[0], by_order[0]))
-    t = found.state.density_kg_m3 / u_density
-    density = Reading(found.state.density_kg_m3, u_density)
-    is_rough = is_bulged or roughness(found, chosen) > 1
+        solution, other_order = _with_order(chosen, with_sure_fittings(chosen, solution, quantum))
+        seams = solution if "seams" in solution.state.free else _free_seams(chosen, solution)
+    if seams is not None and (not seams_known or _are_elsewhere(solution, seams)):
+        solution = seams = without_phantoms(chosen, seams, quantum)
+    seams_are = "found" if "seams" in solution.state.free else "declared"
+    scale = scale_of_u(solution, chosen, quantum)
+    layout, by_order = solution.state.layout, _by_order(solution, other_order)
+    u_density = float(np.hypot((solution.sd("density") * scale[layout["density"]])[0], by_order[0]))
+    t = solution.state.density_kg_m3 / u_density
+    density = Reading(solution.state.density_kg_m3, u_density)
+    is_rough = is_bulged or roughness(solution, chosen) > 1
     head, without = _decide_head(density, former.liquid_density_kg_m3, is_rough), None
-    independent = _independent(found)
-    dry = _without_head(chosen, found)
+    independent = _independent(solution)
+    dry = _without_head(chosen, solution)
     if head != "without":
         without = (*_remainders(dry.left_m3), dry.state.radii_m)
     if head == "undecided":
-        found, other = _with_usual_density(chosen, former, found, dry), None
+        solution, other_order = _with_usual_density(chosen, former, solution, dry), None
     if head == "without":
-        found, other = dry, None
-    found = without_phantoms(chosen, found, quantum)
-    scale = scale_of_u(found, chosen, quantum)
+        solution, other_order = dry, None
+    solution = without_phantoms(chosen, solution, quantum)
+    scale = scale_of_u(solution, chosen, quantum)
     u_seams = (
         seams.sd("seams") * scale_of_u(seams, chosen, quantum)[seams.state.layout["seams"]]
         if seams
         else None
     )
     return _as_geometry(
-        former, found, rows, used,
+        former, solution, rows, used,
         scale=scale, density=density, head=head, t=t, without=without,
-        seams=_seam_readings(seams.state if seams else found.state, u_seams),
-        seams_are=seams_are, by_order=_by_order(found, other)[1], independent=independent,
+        seams=_seam_readings(seams.state if seams else solution.state, u_seams),
+        seams_are=seams_are, by_order=_by_order(solution, other_order)[1], independent=independent,
     )  # fmt: skip
 
 
-def _independent(found):
+def _independent(solution):
     """Standard deviations of density and radii (n,) for independent rounding."""
-    return float(found.sd("density")[0]), found.sd("radii")
+    return float(solution.sd("density")[0]), solution.sd("radii")
 
 
-def _with_order(rows, found):
+def _with_order(rows, solution):
     """Return the Fit with the order of the head that fits better, and the Fit with the other order.
 
     The first order is used if both fit equally. The second Fit is None if it is clearly worse.
     """
     try:
-        second = rows.adjust(replace(found.state, is_first_order=False))
+        second = rows.adjust(replace(solution.state, is_first_order=False))
     except SolutionError:
-        return found, None
-    better = found.chi2 - second.chi2
-    first, last = (second, found) if better > BY_ORDER else (found, second)
+        return solution, None
+    better = solution.chi2 - second.chi2
+    first, last = (second, solution) if better > BY_ORDER else (solution, second)
     return first, last if abs(better) < ORDER_IS_CLEAR else None
 
 
-def _by_order(found, other):
+def _by_order(solution, other_order):
     """Contribution of the unknown order of the head to the sds of density and radii (n,)."""
-    if other is None:
-        return 0.0, np.zeros(len(found.state.radii_m))
-    density = abs(found.state.density_kg_m3 - other.state.density_kg_m3)
-    return density / np.sqrt(3), (found.state.radii_m - other.state.radii_m) / np.sqrt(3)
+    if other_order is None:
+        return 0.0, np.zeros(len(solution.state.radii_m))
+    density = abs(solution.state.density_kg_m3 - other_order.state.density_kg_m3)
+    return density / np.sqrt(3), (solution.state.radii_m - other_order.state.radii_m) / np.sqrt(3)
 
 
-def _with_known_zero(rows, former, found):
+def _with_known_zero(rows, former, solution):
     """Return the Fit of a tank empty at dip 0, the bottom of the first ring, if rows allow it."""
     if not (rows.dip_m[0] == 0 and rows.volume_m3[0] == 0) or former.volume_quantum_m3 == 0:
-        return found
-    free = found.state.free - {"zero", "base"}
+        return solution
+    free = solution.state.free - {"zero", "base"}
     try:
-        held = rows.adjust(replace(found.state, zero_m=0.0, base_m3=0.0, free=free))
+        held = rows.adjust(replace(solution.state, zero_m=0.0, base_m3=0.0, free=free))
     except SolutionError:
-        return found
-    return held if held.chi2 - found.chi2 < SAME_ZERO**2 + 2 else found
+        return solution
+    return held if held.chi2 - solution.chi2 < SAME_ZERO**2 + 2 else solution
 
 
-def _free_seams(rows, found):
+def _free_seams(rows, solution):
     """Return the Fit with separately estimated seams; None if it has no solution."""
-    if not len(found.state.seams_m):
+    if not len(solution.state.seams_m):
         return None
-    free = (found.state.free | {"seams"}) - {"zero"}
+    free = (solution.state.free | {"seams"}) - {"zero"}
     try:
-        seams = rows.adjust(replace(found.state, free=free))
+        seams = rows.adjust(replace(solution.state, free=free))
     except SolutionError:
         return None
     return seams if np.all(np.diff(seams.state.rings.edges_m) > 0) else None
 
 
-def _are_elsewhere(found, seams):
+def _are_elsewhere(solution, seams):
     """Whether seams differ from the declared ones: one of them clearly, or all together by chi2."""
-    apart = np.abs(seams.state.seams_m - found.state.seams_m)
+    apart = np.abs(seams.state.seams_m - solution.state.seams_m)
     count = len(apart)
     return bool(np.any(apart > CRITICAL * seams.sd("seams"))) and (
-        found.chi2 - seams.chi2 > LEAST_GAIN + count
+        solution.chi2 - seams.chi2 > LEAST_GAIN + count
     )
 
 
-def _without_head(rows, found):
+def _without_head(rows, solution):
     """Return the Fit without a head."""
-    free = found.state.free - {"density"}
-    dry = replace(found.state, density_kg_m3=0.0, free=free)
-    found = tried(rows, dry) or tried(rows, replace(dry, free=free - {"kinks"}))
-    return found or rows.adjust(replace(dry, free=free - {"kinks", "zero"}))
+    free = solution.state.free - {"density"}
+    dry = replace(solution.state, density_kg_m3=0.0, free=free)
+    solution = tried(rows, dry) or tried(rows, replace(dry, free=free - {"kinks"}))
+    return solution or rows.adjust(replace(dry, free=free - {"kinks", "zero"}))
 
 
 def _usual_density(former):
@@ -336,13 +338,13 @@ def _usual_density(former):
     return USUAL_KG_M3 if declared is None else (declared, DECLARED_SD_KG_M3)
 
 
-def _with_usual_density(rows, former, found, dry):
+def _with_usual_density(rows, former, solution, dry):
     """Return the Fit with the prior density, as the table does not determine it."""
     usual, sd = _usual_density(former)
     state = replace(
-        found.state, density_kg_m3=usual, usual_density_kg_m3=usual, density_sd_kg_m3=sd
+        solution.state, density_kg_m3=usual, usual_density_kg_m3=usual, density_sd_kg_m3=sd
     )
-    again = tried(rows, state) or found
+    again = tried(rows, state) or solution
     density = again.state.density_kg_m3
     if LIGHTEST_KG_M3 <= density <= DENSEST_KG_M3:
         return again
@@ -376,18 +378,18 @@ def is_possible(density):
     return -reach <= density.value <= DENSEST_KG_M3 + reach
 
 
-def _remainders(left):
-    return float(np.sqrt(np.mean(left**2))), float(np.abs(left).max())
+def _remainders(residuals):
+    return float(np.sqrt(np.mean(residuals**2))), float(np.abs(residuals).max())
 
 
-def _as_geometry(former, found, rows, used, *, scale, density, head, t, without, seams,
+def _as_geometry(former, solution, rows, used, *, scale, density, head, t, without, seams,
                  seams_are, by_order, independent):  # fmt: skip
-    state, layout = found.state, found.state.layout
+    state, layout = solution.state, solution.state.layout
     radii = layout["radii"]
-    covariance = found.cofactor[radii, radii] * np.outer(scale[radii], scale[radii])
+    covariance = solution.cofactor[radii, radii] * np.outer(scale[radii], scale[radii])
     covariance = covariance + np.outer(by_order, by_order)
-    sd = {name: found.sd(name) * scale[part] for name, part in layout.items()}
-    rms, largest = _remainders(found.left_m3)
+    sd = {name: solution.sd(name) * scale[part] for name, part in layout.items()}
+    rms, largest = _remainders(solution.left_m3)
     chosen = rows.of(used)
     edges = state.rings.edges_m
     return UprightGeometry(
@@ -413,7 +415,7 @@ def _as_geometry(former, found, rows, used, *, scale, density, head, t, without,
         largest_m3=largest,
         expected_m3=float(np.sqrt(np.mean(chosen.sd_m3**2))),
         without_head=without,
-        roughness=roughness(found, chosen),
+        roughness=roughness(solution, chosen),
         state=state,
         independent_u=independent,
     )
@@ -436,10 +438,12 @@ def _seam_readings(state, sds):
 
 
 def _found_fittings(state, sds):
-    found = []
-    for k, one in enumerate(state.fittings):
-        held = held_kinks(state, one)
+    fittings = []
+    for k, fitting in enumerate(state.fittings):
+        held = held_kinks(state, fitting)
         u = [np.nan if h else s for h, s in zip(held, sds[3 * k : 3 * k + 2], strict=True)]
-        volume = Reading(one.volume_m3, float(sds[3 * k + 2]))
-        found.append(FoundFitting(Reading(one.bottom_m, u[0]), Reading(one.top_m, u[1]), volume))
-    return tuple(sorted(found, key=lambda one: one.bottom_m.value))
+        volume = Reading(fitting.volume_m3, float(sds[3 * k + 2]))
+        fittings.append(
+            FoundFitting(Reading(fitting.bottom_m, u[0]), Reading(fitting.top_m, u[1]), volume)
+        )
+    return tuple(sorted(fittings, key=lambda fitting: fitting.bottom_m.value))

@@ -72,18 +72,19 @@ def search(rows, state, lowest_m, usual_density):
     edges = state.rings.edges_m
     shows_bulges = show_bulges(rows.dip_m, rows.volume_m3, rows.sd_m3, edges)
     if shows_bulges:
-        found = _search_bulged(rows, state, lowest_m, *usual_density)
-        if found is not None and not _is_straight(rows, found):
-            return found
-    found = _search_straight(rows, state, lowest_m)
-    if shows_bulges or _is_plain(found) or _is_by_rounding(found):
-        return found
+        solution = _search_bulged(rows, state, lowest_m, *usual_density)
+        if solution is not None and not _is_straight(rows, solution):
+            return solution
+    solution = _search_straight(rows, state, lowest_m)
+    if shows_bulges or _is_plain(solution) or _is_by_rounding(solution):
+        return solution
     # In a coarse table, bulges look like many fittings, or like fittings that end at joints.
     bulged = _search_bulged(rows, state, lowest_m, *usual_density)
     is_simpler = bulged is not None and (
-        len(bulged.state.fittings) < len(found.state.fittings) and _cost(bulged) < _cost(found)
+        len(bulged.state.fittings) < len(solution.state.fittings)
+        and _cost(bulged) < _cost(solution)
     )
-    return bulged if is_simpler else found
+    return bulged if is_simpler else solution
 
 
 def _search_straight(rows, state, lowest_m):
@@ -92,16 +93,16 @@ def _search_straight(rows, state, lowest_m):
         rows = rows.above(lowest_m)
         return _with_moved_seams(rows, _with_fittings(rows, state))
     lowest = _lowest_row(rows, state)
-    found = _with_moved_seams(rows.above(lowest), _with_fittings(rows.above(lowest), state))
+    solution = _with_moved_seams(rows.above(lowest), _with_fittings(rows.above(lowest), state))
     if lowest > rows.dip_m[0]:
-        more = replace(found.state, lowest_m=float(rows.dip_m[0]))
+        more = replace(solution.state, lowest_m=float(rows.dip_m[0]))
         try:
-            whole = _with_fittings(rows, more, at_most=len(found.state.fittings) + 1)
+            whole = _with_fittings(rows, more, at_most=len(solution.state.fittings) + 1)
         except SolutionError:
-            return found
-        if _is_by_rounding(whole) and _is_enough(rows, found, whole):
+            return solution
+        if _is_by_rounding(whole) and _is_enough(rows, solution, whole):
             return whole
-    return found
+    return solution
 
 
 def _search_bulged(rows, state, lowest_m, density, density_sd):
@@ -121,9 +122,9 @@ def _search_bulged(rows, state, lowest_m, density, density_sd):
     some = rows.above(lowest).thinned(MOST_BULGED_ROWS)
     best = None
     for zero in USUAL_ZEROS_M:
-        other = _with_free_zero(some.above(zero + NEAR_M), replace(start, zero_m=zero), zero)
-        if other and (best is None or _cost(other) < _cost(best) - LEAST_GAIN):
-            best = other
+        candidate = _with_free_zero(some.above(zero + NEAR_M), replace(start, zero_m=zero), zero)
+        if candidate and (best is None or _cost(candidate) < _cost(best) - LEAST_GAIN):
+            best = candidate
     if best is None:
         return None
     about = best.state.zero_m
@@ -137,32 +138,34 @@ def _search_bulged(rows, state, lowest_m, density, density_sd):
     return best and _with_lower_rows(rows.above(lowest), best)
 
 
-def _is_straight(rows, found):
+def _is_straight(rows, solution):
     """Whether straight courses with the same fittings fit as well as profiles."""
     state = replace(
-        found.state,
+        solution.state,
         bulges_m=None,
         usual_density_kg_m3=None,
         density_sd_kg_m3=DENSITY_SD_KG_M3,
     )
-    rows = rows.above(found.state.lowest_m)
+    rows = rows.above(solution.state.lowest_m)
     free_zero = replace(state, free=state.free | {"zero"})  # profiles absorb an error of the zero
-    tries = (tried(rows, one) for one in (state, free_zero))
-    return any(one is not None and one.chi2 < found.cost + PRICE for one in tries)
+    tries = (tried(rows, start) for start in (state, free_zero))
+    return any(trial is not None and trial.chi2 < solution.cost + PRICE for trial in tries)
 
 
-def _without_unsure(rows, found):
+def _without_unsure(rows, solution):
     """Return the Fit without insignificant fittings, where courses bulge."""
-    while found.state.fittings:
-        sds = found.sd("fittings")[2::3] * roughness(found, rows)
-        sizes = np.abs([one.volume_m3 for one in found.state.fittings]) / np.maximum(sds, 1e-12)
+    while solution.state.fittings:
+        sds = solution.sd("fittings")[2::3] * roughness(solution, rows)
+        sizes = np.abs([fitting.volume_m3 for fitting in solution.state.fittings]) / np.maximum(
+            sds, 1e-12
+        )
         worst = int(np.argmin(sizes))
-        rest = found.state.fittings[:worst] + found.state.fittings[worst + 1 :]
-        again = tried(rows, replace(found.state, fittings=rest))
+        rest = solution.state.fittings[:worst] + solution.state.fittings[worst + 1 :]
+        again = tried(rows, replace(solution.state, fittings=rest))
         if sizes[worst] >= SURE_OF_BULGED or again is None:
             break
-        found = again
-    return found
+        solution = again
+    return solution
 
 
 def _is_of_joint(state, thing):
@@ -175,33 +178,33 @@ def _is_of_joint(state, thing):
     return thickness <= 0 or (is_near and thickness < DRAWN_IN_M)
 
 
-def _with_moved_seams(rows, found):
+def _with_moved_seams(rows, solution):
     """Return the Fit with seams from the rows, if this removes fittings that resemble seams."""
-    if _is_plain(found) or not len(found.state.seams_m):
-        return found
-    zero = found.state.zero_m
-    edges = found.state.rings.edges_m[1:-1]
+    if _is_plain(solution) or not len(solution.state.seams_m):
+        return solution
+    zero = solution.state.zero_m
+    edges = solution.state.rings.edges_m[1:-1]
     moved = move_seams(rows.dip_m, rows.volume_m3, rows.sd_m3, edges) - zero
     if np.any(np.diff(moved) <= 0):
-        return found
-    state = replace(found.state, seams_m=moved, fittings=(), free=frozenset(SEAMS_FREE))
-    other = _from_zero(rows.above(zero + NEAR_M), state, MOST_FITTINGS)
+        return solution
+    state = replace(solution.state, seams_m=moved, fittings=(), free=frozenset(SEAMS_FREE))
+    candidate = _from_zero(rows.above(zero + NEAR_M), state, MOST_FITTINGS)
     price = LEAST_GAIN * len(moved) / 2
-    is_better = other is not None and _cost(other) + price < _cost(found)
-    return _with_lower_rows(rows, other) if is_better else found
+    is_better = candidate is not None and _cost(candidate) + price < _cost(solution)
+    return _with_lower_rows(rows, candidate) if is_better else solution
 
 
-def _is_enough(rows, found, whole):
+def _is_enough(rows, solution, larger):
     """Whether the reduction of chi2 is large for the number of new unknowns."""
-    return len(rows.dip_m) - len(found.left_m3) > 10 * (
-        len(whole.state.unknowns) - len(found.state.unknowns)
+    return len(rows.dip_m) - len(solution.left_m3) > 10 * (
+        len(larger.state.unknowns) - len(solution.state.unknowns)
     )
 
 
-def _is_by_rounding(found):
+def _is_by_rounding(solution):
     """Whether all residuals are within rounding: as a whole, and at the worst row."""
-    worst = np.abs(found.left_m3 / found.sd_m3).max()
-    return found.chi2 < ROUGH**2 * max(found.dof, 1) and worst < np.sqrt(3) * 1.25
+    worst = np.abs(solution.left_m3 / solution.sd_m3).max()
+    return solution.chi2 < ROUGH**2 * max(solution.dof, 1) and worst < np.sqrt(3) * 1.25
 
 
 def _lowest_row(rows, state, degree=2):
@@ -259,12 +262,12 @@ def _with_fittings(rows, state, at_most=MOST_FITTINGS):
     best, tried = None, 0
     for zero in (state.zero_m,) if state.fittings else (zeros[0], *USUAL_ZEROS_M, *zeros[1:]):
         most = at_most if best is None else min(at_most, _most_fittings(best))
-        other = _from_zero(rows.above(zero + NEAR_M), replace(state, zero_m=zero), most)
-        if other and (best is None or _cost(other) < _cost(best) - SAME_COST):
-            best = other
+        candidate = _from_zero(rows.above(zero + NEAR_M), replace(state, zero_m=zero), most)
+        if candidate and (best is None or _cost(candidate) < _cost(best) - SAME_COST):
+            best = candidate
         if best and _is_plain(best) and _is_by_rounding(best):
             break
-        tried += other is None or len(other.state.fittings) >= at_most
+        tried += candidate is None or len(candidate.state.fittings) >= at_most
         if tried > 1:
             break
     if best is None:
@@ -279,17 +282,17 @@ def _with_fittings(rows, state, at_most=MOST_FITTINGS):
     return _with_lower_rows(rows, best)
 
 
-def _with_lower_rows(rows, found):
+def _with_lower_rows(rows, solution):
     """Return the Fit with rows that were excluded because the first ring might begin among them."""
-    more = len(rows.dip_m) - len(found.left_m3)
+    more = len(rows.dip_m) - len(solution.left_m3)
     for lowest in rows.dip_m[:more]:
         chosen = rows.above(lowest)
-        again = tried(chosen, replace(found.state, base_m3=float(chosen.volume_m3[0])))
+        again = tried(chosen, replace(solution.state, base_m3=float(chosen.volume_m3[0])))
         if again and _is_possible(again):
-            gain = again.chi2 - found.chi2
-            if gain < len(chosen.dip_m) - len(found.left_m3) + SAME_ZERO**2:
+            gain = again.chi2 - solution.chi2
+            if gain < len(chosen.dip_m) - len(solution.left_m3) + SAME_ZERO**2:
                 return again
-    return found
+    return solution
 
 
 def _most_fittings(best):
@@ -297,20 +300,20 @@ def _most_fittings(best):
     return max(int((_cost(best) - LEAST_CHI2 * best.dof) / PRICE), 0)
 
 
-def _is_plain(found):
+def _is_plain(solution):
     """Whether there are few fittings, and none resembles a seam of a wrong zero."""
-    seams = found.state.rings.edges_m[1:-1]
-    return len(found.state.fittings) <= FEW_FITTINGS and all(
-        one.volume_m3 < 0
-        and one.top_m - one.bottom_m < LENGTHS_M[0]
-        and not np.any(np.abs(seams - one.bottom_m) < NEAR_M)
-        and not np.any(np.abs(seams - one.top_m) < NEAR_M)
-        for one in found.state.fittings
+    seams = solution.state.rings.edges_m[1:-1]
+    return len(solution.state.fittings) <= FEW_FITTINGS and all(
+        fitting.volume_m3 < 0
+        and fitting.top_m - fitting.bottom_m < LENGTHS_M[0]
+        and not np.any(np.abs(seams - fitting.bottom_m) < NEAR_M)
+        and not np.any(np.abs(seams - fitting.top_m) < NEAR_M)
+        for fitting in solution.state.fittings
     )
 
 
-def _cost(found):
-    return found.cost + PRICE * len(found.state.fittings)
+def _cost(solution):
+    return solution.cost + PRICE * len(solution.state.fittings)
 
 
 def _from_zero(rows, start, at_most):
@@ -320,40 +323,40 @@ def _from_zero(rows, start, at_most):
     fitting.
     """
     about = start.zero_m
-    found = _with_free_zero(rows, start, about)
-    for longest in LENGTHS_M if found else ():
-        while len(found.state.fittings) < at_most and found.dof > 6:
-            again = _with_one_more(rows, found, longest, about)
+    solution = _with_free_zero(rows, start, about)
+    for longest in LENGTHS_M if solution else ():
+        while len(solution.state.fittings) < at_most and solution.dof > 6:
+            again = _with_one_more(rows, solution, longest, about)
             if again is None:
                 break
-            found = again
-    return _tidied(rows, found, about) if found else None
+            solution = again
+    return _tidied(rows, solution, about) if solution else None
 
 
-def _with_one_more(rows, found, longest, about, rough=False):
+def _with_one_more(rows, solution, longest, about, rough=False):
     """Return the Fit with the fitting that explains most; None if no fitting explains enough.
 
     rough: whether residuals exceed rounding; the required gain is then relative to the residuals.
     """
     design, left, sds = (
-        found.bulges
+        solution.bulges
     )  # prior observations do not depend on a fitting: place them at the lowest row
     candidates = find_fittings(
         np.append(np.full(len(sds), rows.dip_m[0]), rows.dip_m),
-        np.append(left, found.left_m3),
-        np.vstack([design, found.design]),
+        np.append(left, solution.left_m3),
+        np.vstack([design, solution.design]),
         np.append(sds, rows.sd_m3),
         longest,
     )
     for thing, gain in candidates:
         if gain < LEAST_GAIN:
             break
-        more = replace(found.state, fittings=(*found.state.fittings, thing))
+        more = replace(solution.state, fittings=(*solution.state.fittings, thing))
         again = _with_free_zero(rows, more, about)
         factor = roughness(again, rows) ** 2 if rough and again else 1.0
         if (
             again
-            and found.cost - again.cost > LEAST_GAIN * factor
+            and solution.cost - again.cost > LEAST_GAIN * factor
             and _is_large(rows, again.state.fittings[-1])
             and not (rough and _is_of_joint(again.state, again.state.fittings[-1]))
         ):
@@ -366,98 +369,100 @@ def _is_large(rows, thing):
     return abs(thing.volume_m3) > LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
 
 
-def _tidied(rows, found, about):
+def _tidied(rows, solution, about):
     """Return the Fit with fewer fittings, if fewer fit equally well."""
-    if len(found.state.fittings) > 1:
+    if len(solution.state.fittings) > 1:
         near = 1.6 * float(np.median(np.diff(rows.dip_m)))
         for share in SAME_SLOPES:
-            pairs = in_other_pairs(found.state.fittings, near, share)
-            found = _cheaper(rows, found, pairs, about)
-    for one in sorted(found.state.fittings, key=lambda one: abs(one.volume_m3)):
-        rest = tuple(f for f in found.state.fittings if f.volume_m3 != one.volume_m3)
-        found = _cheaper(rows, found, rest, about)
-    return found
+            pairs = in_other_pairs(solution.state.fittings, near, share)
+            solution = _cheaper(rows, solution, pairs, about)
+    for smallest in sorted(solution.state.fittings, key=lambda fitting: abs(fitting.volume_m3)):
+        rest = tuple(f for f in solution.state.fittings if f.volume_m3 != smallest.volume_m3)
+        solution = _cheaper(rows, solution, rest, about)
+    return solution
 
 
-def with_sure_fittings(rows, found, quantum_m3):
+def with_sure_fittings(rows, solution, quantum_m3):
     """Return the Fit without fittings whose volume does not exceed its uncertainty."""
-    found = without_phantoms(rows, found, quantum_m3)
-    while found.state.fittings:
-        things = found.state.fittings
-        sizes = _sizes(rows, found, quantum_m3)
+    solution = without_phantoms(rows, solution, quantum_m3)
+    while solution.state.fittings:
+        things = solution.state.fittings
+        sizes = _sizes(rows, solution, quantum_m3)
         worst = int(np.argmin(sizes))
         rest = things[:worst] + things[worst + 1 :]
-        again = tried(rows, replace(found.state, fittings=rest))
-        rise = np.inf if again is None else again.chi2 - found.chi2
+        again = tried(rows, replace(solution.state, fittings=rest))
+        rise = np.inf if again is None else again.chi2 - solution.chi2
         limit = 2 * LEAST_GAIN if sizes[worst] < CRITICAL else LEAST_GAIN
         if limit < rise < DOUBTFUL_GAIN and quantum_m3 > 0:
             limit = MARGIN * _gain_by_chance(again, rows, quantum_m3)
         if rise > limit:
             break
-        found = again
-    return found
+        solution = again
+    return solution
 
 
-def without_phantoms(rows, found, quantum_m3):
+def without_phantoms(rows, solution, quantum_m3):
     """Return the Fit without fittings whose u exceeds their volume.
 
     They are removed even if they explain residuals, which are then reported as excess residuals.
     Free seams can leave such fittings when they replace a kink.
     """
-    while found.state.fittings:
-        sizes = _sizes(rows, found, quantum_m3)
+    while solution.state.fittings:
+        sizes = _sizes(rows, solution, quantum_m3)
         worst = int(np.argmin(sizes))
         if sizes[worst] >= 1:
             break
-        things = found.state.fittings
-        bare = replace(found.state, fittings=things[:worst] + things[worst + 1 :])
+        things = solution.state.fittings
+        bare = replace(solution.state, fittings=things[:worst] + things[worst + 1 :])
         held = replace(bare, free=bare.free - {"kinks", "zero"})
         again = tried(rows, bare) or tried(rows, held)
         if again is None:
             break
-        found = again
-    return found
+        solution = again
+    return solution
 
 
-def _sizes(rows, found, quantum_m3):
+def _sizes(rows, solution, quantum_m3):
     """Volumes of fittings over their u, shape (fittings,); 0 if u is unknown."""
-    scale = scale_of_u(found, rows, quantum_m3)[found.state.layout["fittings"]]
-    sds = (found.sd("fittings") * scale)[2::3]
-    sizes = np.abs([one.volume_m3 for one in found.state.fittings]) / sds
+    scale = scale_of_u(solution, rows, quantum_m3)[solution.state.layout["fittings"]]
+    sds = (solution.sd("fittings") * scale)[2::3]
+    sizes = np.abs([fitting.volume_m3 for fitting in solution.state.fittings]) / sds
     return np.nan_to_num(sizes, nan=0.0)
 
 
-def _gain_by_chance(found, rows, quantum):
+def _gain_by_chance(solution, rows, quantum):
     """Largest reduction of chi2 by a fitting in simulations of correlated rounding."""
-    q = np.linalg.qr(found.design / rows.sd_m3[:, None])[0]
+    q = np.linalg.qr(solution.design / rows.sd_m3[:, None])[0]
     gains = []
-    for error in rounded_again(found, rows, quantum, CHANCES):
+    for error in rounded_again(solution, rows, quantum, CHANCES):
         left = error / rows.sd_m3
         left = (left - q @ (q.T @ left)) * rows.sd_m3
-        best = find_fittings(rows.dip_m, left, found.design, rows.sd_m3, most=1)
+        best = find_fittings(rows.dip_m, left, solution.design, rows.sd_m3, most=1)
         gains.append(best[0][1] if best else 0.0)
     return max(gains)
 
 
-def _cheaper(rows, found, fittings, about):
-    if len(fittings) > len(found.state.fittings):
-        return found
-    other = _with_free_zero(rows, replace(found.state, fittings=fittings), about)
-    return other if other and _cost(other) < _cost(found) else found
+def _cheaper(rows, solution, fittings, about):
+    if len(fittings) > len(solution.state.fittings):
+        return solution
+    candidate = _with_free_zero(rows, replace(solution.state, fittings=fittings), about)
+    return candidate if candidate and _cost(candidate) < _cost(solution) else solution
 
 
-def _is_possible(found):
-    state = found.state
+def _is_possible(solution):
+    state = solution.state
     cut = np.pi * state.radii_m[0] ** 2
     largest = LOW_SHARE * cut
     return abs(state.zero_m) <= FARTHEST_M and all(
-        one.bottom_m < one.top_m
-        and -TAKEN_SHARE * cut < one.volume_m3 / (one.top_m - one.bottom_m) < GIVEN_SHARE * cut
+        fitting.bottom_m < fitting.top_m
+        and -TAKEN_SHARE * cut
+        < fitting.volume_m3 / (fitting.top_m - fitting.bottom_m)
+        < GIVEN_SHARE * cut
         and (
-            one.bottom_m > state.lowest_m + LOW_M
-            or abs(one.volume_m3) < largest * (one.top_m - one.bottom_m)
+            fitting.bottom_m > state.lowest_m + LOW_M
+            or abs(fitting.volume_m3) < largest * (fitting.top_m - fitting.bottom_m)
         )
-        for one in state.fittings
+        for fitting in state.fittings
     )
 
 

@@ -74,13 +74,13 @@ def tank_of_rules(facts, former, new):
 
 def legal_numbers(rule, tank, former, new, basis, former_U, new_U):
     """Return the `LegalNumber` of each limit of a rule for a kind of tank."""
-    found = [
-        _deviation(one, basis, former_U, new_U)
-        for one in rule.deviation
-        if is_for(one, tank) and basis.for_use.any()
+    numbers = [
+        _deviation(limit, basis, former_U, new_U)
+        for limit in rule.deviation
+        if is_for(limit, tank) and basis.for_use.any()
     ]
-    heights = [one for one in rule.reference_height if is_for(one, tank)]
-    return [*found, *(_reference_height(one, former, new) for one in heights)]
+    heights = [limit for limit in rule.reference_height if is_for(limit, tank)]
+    return [*numbers, *(_reference_height(height, former, new) for height in heights)]
 
 
 def is_for(limit, tank):
@@ -99,8 +99,8 @@ def _deviation(limit, basis, former_U, new_U):
         else new_U.deliveries(np.array([low]), np.array([high]))[0]
     )
     known = 0.0 if np.isnan(U) else float(U)
-    dips = [float(basis.height_m[one]) for one in (low, high) if one is not None]
-    found = judge_volume(
+    dips = [float(basis.height_m[dip]) for dip in (low, high) if dip is not None]
+    judged = judge_volume(
         limit,
         StatedVolume(stated, dips[-1], dips[0] if low is not None else None),
         Quantity(value, known / new_U.k, np.inf, new_U.k, known),
@@ -121,7 +121,7 @@ def _deviation(limit, basis, former_U, new_U):
         value=float(numbers[0]),
         as_printed=float(numbers[1]),
         at_m=dips,
-        verdict="not_judged" if unknown else found.code,
+        verdict="not_judged" if unknown else judged.code,
         clause=limit.clause,
         verified=limit.verified,
     )
@@ -170,23 +170,27 @@ def ages_of(rule, tank, former, new):
     years = _years_between(former.date, new.date)
     return [
         TableAge(
-            name=one.name,
-            of=one.of,
-            years=one.years,
+            name=period.name,
+            of=period.of,
+            years=period.years,
             age_years=years,
-            verdict="not_judged" if years is None else "fails" if years > one.years else "conforms",
-            clause=one.clause,
-            verified=one.verified,
+            verdict="not_judged"
+            if years is None
+            else "fails"
+            if years > period.years
+            else "conforms",
+            clause=period.clause,
+            verified=period.verified,
         )
-        for one in rule.periods
-        if is_for(one, tank)
+        for period in rule.periods
+        if is_for(period, tank)
     ]
 
 
 def _years_between(before, after):
     """Years between two dates given as text; None if one is unknown, or the order is wrong."""
     try:
-        first, last = (date.fromisoformat(str(one)[:10]) for one in (before, after))
+        first, last = (date.fromisoformat(str(text)[:10]) for text in (before, after))
     except ValueError:
         return None
     years = (last - first).days / DAYS_OF_YEAR
@@ -198,7 +202,7 @@ def _years_between(before, after):
 
 def zero_limit_of(rule, tank):
     """Largest undeclared zero, m, by the rule or by default."""
-    return min((one.limit_m for one in rule.reference_height if is_for(one, tank)),
+    return min((limit.limit_m for limit in rule.reference_height if is_for(limit, tank)),
                default=USUAL_LIMIT_M)  # fmt: skip
 
 
@@ -223,7 +227,7 @@ def decide(legal, ages, basis, worst, c, zero_limit_m):
         volumes = {"d_m3": zero.volume_m3, "zero_mm": 1000 * zero.height_m}
         grave.append(Reason("zero_not_explained", volumes | {"most_mm": 1000 * zero_limit_m}))
     grave += _too_old(ages)
-    judged = [one for one in (*legal, *ages) if one.verdict != "not_judged"]
+    judged = [item for item in (*legal, *ages) if item.verdict != "not_judged"]
     differing = [name for name in ON_BASIS if steps[name].state == "done"]
     undone = {
         name: list(step.lacking)
@@ -235,44 +239,49 @@ def decide(legal, ages, basis, worst, c, zero_limit_m):
         mild.append(Reason("basis_differs", {"steps": differing}))
     mild += [Reason("step_not_done", {"step": n, "lacking": what}) for n, what in undone.items()]
     mild += _agreeing(worst, c)
-    kept = [one.code for one in legal if one.verdict == "conforms"]
+    kept = [number.code for number in legal if number.verdict == "conforms"]
     if kept:
         mild.append(Reason("limits_kept", {"limits": kept}))
     mild += [
-        Reason("limit_not_judged", {"limit": one.code})
-        for one in legal
-        if one.verdict == "not_judged"
+        Reason("limit_not_judged", {"limit": number.code})
+        for number in legal
+        if number.verdict == "not_judged"
     ]
     mild += [
-        Reason("age_not_judged", {"of": one.of, "years": one.years})
-        for one in ages
-        if one.verdict == "not_judged"
+        Reason("age_not_judged", {"of": age.of, "years": age.years})
+        for age in ages
+        if age.verdict == "not_judged"
     ]
     code = "recalibrate" if grave else "recompute" if differing else "keep"
-    if not (grave or worst or any(one in legal for one in judged)):
+    if not (grave or worst or any(item in legal for item in judged)):
         code, grave = None, [Reason("nothing_to_judge", {})]
-    return Verdict(code, all(one.verified for one in judged), (*grave, *mild))
+    return Verdict(code, all(item.verified for item in judged), (*grave, *mild))
 
 
 def _broken(legal):
     return [
         Reason(
-            "limit_exceeded" if one.verdict == "fails" else "in_guard_band",
-            {"limit": one.code, "value": one.value, "most": one.limit, "unit": one.unit},
+            "limit_exceeded" if number.verdict == "fails" else "in_guard_band",
+            {
+                "limit": number.code,
+                "value": number.value,
+                "most": number.limit,
+                "unit": number.unit,
+            },
         )
-        for one in legal
-        if one.verdict in FAILED
+        for number in legal
+        if number.verdict in FAILED
     ]
 
 
 def _too_old(ages):
     return [
         Reason(
-            "age_of_bottom_course_exceeded" if one.of == "bottom_course" else "age_exceeded",
-            {"age": one.age_years, "years": one.years},
+            "age_of_bottom_course_exceeded" if age.of == "bottom_course" else "age_exceeded",
+            {"age": age.age_years, "years": age.years},
         )
-        for one in ages
-        if one.verdict == "fails"
+        for age in ages
+        if age.verdict == "fails"
     ]
 
 
@@ -283,15 +292,15 @@ def _differing(worst, c):
 
 
 def _agreeing(worst, c):
-    found = []
+    reasons = []
     if worst is None:
         return [Reason("E_n_not_known", {})]
     if abs(worst.E_n) <= 1:
-        found.append(Reason("tank_agrees", {"E_n": worst.E_n, "c": c or 0.0, **worst.place}))
+        reasons.append(Reason("tank_agrees", {"E_n": worst.E_n, "c": c or 0.0, **worst.place}))
     if c is None:
         limit = None if np.isnan(worst.c_limit) else worst.c_limit
-        found.append(Reason("c_not_declared", {"c_limit": limit}))
-    return found
+        reasons.append(Reason("c_not_declared", {"c_limit": limit}))
+    return reasons
 
 
 def _finite(value):

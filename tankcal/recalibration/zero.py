@@ -38,13 +38,13 @@ def find_zeros(dips_m, volumes_m3, sd_m3, seams_m, most=3):
     if np.ptp(votes) < 1.0:
         return (0.0,)
     votes = votes + 0.5 * (zeros / FARTHEST_M) ** 2  # of equal candidates, prefer the one near 0
-    found = []
+    candidates = []
     for place in np.argsort(votes):
-        if all(abs(zeros[place] - zero) >= APART_M for zero in found):
-            found.append(float(zeros[place]))
-        if len(found) == most:
+        if all(abs(zeros[place] - zero) >= APART_M for zero in candidates):
+            candidates.append(float(zeros[place]))
+        if len(candidates) == most:
             break
-    return tuple(found)
+    return tuple(candidates)
 
 
 def move_seams(dips_m, volumes_m3, sd_m3, seams_m):
