@@ -1,4 +1,4 @@
-"""The export of a record: which rows, how far off, written by a profile and read back."""
+"""Export of a record: selection of rows, error bound, writing by a profile, reading back."""
 
 import hashlib
 import os
@@ -22,34 +22,33 @@ from tankcal.text.words import load_words, say
 
 @dataclass(frozen=True)
 class Export:
-    """A table as a system will read it, with what that costs.
+    """A table as a system will read it, with its error.
 
     Attributes
     ----------
     profile : Profile
     tank : str
-        Its name.
+        Name of the tank.
     dip_m, volume_m3 : (points,) ndarray
-        What the system makes of the rows of the file, ascending.
+        Rows of the file as the system interprets them, ascending.
     rows : int
-        Of the table in the record.
+        Number of rows of the table in the record.
     error_m3 : float
-        Bound of the distance of what the system reads from the exact volume at any dip: rounding,
-        the line or spline, and `own_m3`.
+        Bound of the error at any dip: rounding, line or spline, and `own_m3`.
     at_m : float
-        Dip where it is reached (but for own_m3).
+        Dip of the largest error (without own_m3).
     own_m3 : float
-        Largest error of straight lines between the rows of the record, as the record states it.
+        Largest error of linear interpolation in the record, as stated in the record.
     rounded_levels : int
-        Rows whose level is not the row's own, for the profile has no such mark.
+        Number of rows whose level is rounded to a mark of the profile.
     gauge : GaugeCorrection or None
-        HyTD of a gauge that hangs on the shell.
+        HyTD of a gauge supported by the shell.
     facts : tuple of Message
         Provenance.
     data : bytes
         The file.
     left_out_m : float or None
-        Dip of the highest row of the table, where the file ends below it.
+        Dip of the highest row of the table, if the file ends below it.
     """
 
     profile: object
@@ -68,13 +67,13 @@ class Export:
 
     @property
     def lines(self):
-        """Messages: what the report says of the export."""
+        """Messages of the report."""
         return report_of(self)
 
 
 def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_shell=False,
                   language="en"):  # fmt: skip
-    """The `Export` of the table in a record.
+    """Return the `Export` of the table in a record.
 
     Parameters
     ----------
@@ -82,18 +81,18 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
         A record.json.
     profile : Profile
     points : int, optional
-        Rows of the file at most: those that err least are taken.
+        Largest number of rows of the file; rows with the smallest error are selected.
     max_error_m3 : float, optional
-        The fewest rows that err by no more.
+        Largest error; the fewest rows are selected.
     hangs_on_shell : bool, optional
-        Whether the gauge hangs on the shell: then HyTD is worked out.
+        Whether the gauge is supported by the shell; HyTD is then computed.
     language : str, optional
-        Of the lines of provenance.
+        Language of the lines of provenance.
 
     Raises
     ------
     InputError
-        With every reason why the profile cannot take the table.
+        With every reason why the profile does not fit the table.
     """
     path, log = Path(source), Log()
     record = records.read(path, tables=False)
@@ -136,19 +135,19 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
 
 
 def default_name(export):
-    """What the file of an export is called where nobody says: by the tank and the profile."""
+    """Default name of the file of an export, from the tank and the profile."""
     return f"{file_name(export.tank, 'tank')}-{export.profile.code}{export.profile.ending}"
 
 
 def write_export(export, out, language="en"):
-    """Write the file and its report beside it (NAME-report.txt), both or none; their paths."""
+    """Write the file and its report (NAME-report.txt), both or none; return their paths."""
     out, words = Path(out), load_words(language)
     report = out.with_name(f"{out.stem}-report.txt")
     lines = [say(words, one) for one in (*export.lines, *export.facts)]
     made = {out: export.data, report: "".join(f"{one}\n" for one in lines).encode()}
     waiting = {}
     for path in made:
-        if path.is_dir():  # told before anything is written
+        if path.is_dir():  # reported before any file is written
             raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(path))
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -164,7 +163,7 @@ def write_export(export, out, language="en"):
 
 
 def _check_table(file, record, log):
-    """Tell why a record has no table that can be exported."""
+    """Report why the table of a record cannot be exported."""
     if record.capacity is None:
         text = message("export_no_table", "has no capacity table: its survey was only adjusted")
         log.problem(file, text, None, "capacity")
@@ -181,7 +180,10 @@ def _check_table(file, record, log):
 
 
 def _gauge(file, record, log):
-    """The `GaugeCorrection` of the record's shell; None after telling why there is none."""
+    """Return the `GaugeCorrection` of the record's shell.
+
+    None after reporting why there is none.
+    """
     head = next((one.value for one in record.choices if one.code == "head"), None)
     courses = [(one.height_m, one.thickness_m, one.inside_radius_m) for one in record.courses]
     if not courses or min(thickness for _, thickness, _ in courses) <= 0:

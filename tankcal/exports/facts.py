@@ -1,4 +1,4 @@
-"""What goes with an exported table: its provenance, and what the report says of its errors."""
+"""Provenance of an exported table, and statements about its errors in the report."""
 
 from tankcal.messages import message
 
@@ -6,9 +6,9 @@ _SURVEYS = ("strapping", "lines", "clouds", "hits", "tangents", "liquid", "adjus
 
 
 def facts_of(record, sha256):
-    """Messages, one for each line: what the table is, what it refers to, how uncertain it is.
+    """Return lines of provenance: the table, its references, its uncertainty; a tuple of Message.
 
-    record  record.making.Record        sha256  of its file
+    record: record.making.Record; sha256: SHA-256 of its file.
     """
     table, capacity = record.job.table, record.capacity
     provenance = message("export_record", "record SHA-256 {sha256}, tankcal {version}",
@@ -36,7 +36,7 @@ def facts_of(record, sha256):
 
 
 def report_of(export):
-    """Messages, one for each line: how far off an `Export` is, and what is to be known of it."""
+    """Return the lines of the report of an `Export`: its errors and further facts, as Messages."""
     profile, litres = export.profile, 1000 * export.error_m3
     rows = message(
         "export_rows", "{points} of the {rows} rows of the table, dips {low:.6g} to {high:.6g} m, "
@@ -99,7 +99,7 @@ def _hytd(gauge):
 
 
 def was_surveyed(record):
-    """Whether anything of the tank was measured: not where all of its sizes were declared."""
+    """Whether any quantity of the tank was measured, not only declared."""
     if record.job.tank.kind == "mesh":
         return True
     return record.points != [] or any(getattr(record, one) is not None for one in _SURVEYS)

@@ -1,4 +1,4 @@
-"""Texts of the shipped profiles as Messages, so that each language has its own."""
+"""Texts of the shipped profiles as Messages, for translation."""
 
 from tankcal.messages import message
 
@@ -68,5 +68,5 @@ _KNOWN = {str(one): one for one in _TEXTS}
 
 
 def as_message(text):
-    """A text of a shipped profile as a Message; any other text unchanged."""
+    """Return a text of a shipped profile as a Message; any other text unchanged."""
     return _KNOWN.get(text, text)

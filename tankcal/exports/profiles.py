@@ -1,8 +1,7 @@
-"""Profiles of gauging and inventory systems: what a file for one of them is like (TOML).
+"""Profiles of gauging and inventory systems: descriptions of their files (TOML).
 
-`[profile]` says what it is for and where that was read, `[table]` which rows and columns,
-`[levels]` and `[volumes]` how these are written, `[file]` what stands between and above them.
-docs/exports.md has every key.
+`[profile]` states the system and the source, `[table]` the rows and columns, `[levels]` and
+`[volumes]` their format, `[file]` separators and headers. docs/exports.md lists every key.
 """
 
 import string
@@ -90,16 +89,16 @@ _FOLDER, _ENDING = "exports/shipped_profiles", ".toml"
 
 @dataclass(frozen=True)
 class Profile:
-    """What a file for a system is like; the keys of its file, with what is usual filled in.
+    """Description of a file for a system: the keys of its TOML file, with defaults.
 
     Attributes
     ----------
     code : str
-        Name of the profile's file without its ending.
+        Name of the profile's file without its extension.
     step_m : float or None
-        From row to row, where grid is "step".
+        Step between rows, if grid is "step".
     min_points, max_points : int or None
-        None: no limit is known.
+        None: no known limit.
     largest : float or None
         Largest volume, in the unit of volumes.
     """
@@ -139,7 +138,7 @@ class Profile:
 
     @property
     def leading(self):
-        """The column of levels that the others follow: dip, ullage or increments."""
+        """The leading column of levels: dip, ullage or increments."""
         return next(one for one in self.columns if one in LEVEL_COLUMNS)
 
     @property
@@ -164,9 +163,9 @@ def shipped_profiles():
 
 
 def find_profile(name):
-    """The Profile of a name that ships with tankcal, or of a TOML file.
+    """Return the Profile with a shipped name, or of a TOML file.
 
-    Raises InputError with every problem of the file, or with the names there are.
+    Raises InputError with every problem of the file, or with the list of names.
     """
     shipped = shipped_folder(_FOLDER) / f"{name}{_ENDING}"
     if "/" not in name and "\\" not in name and shipped.is_file():
@@ -191,7 +190,7 @@ def _read(path):
 
 
 def parse_profile(file, data, log):
-    """The Profile in the bytes of a TOML file, or None after telling `log` every problem of it."""
+    """Return the Profile in the bytes of a TOML file; None after reporting its problems."""
     told = len(log.problems)
     settings, sections = read_toml(file, data, log)
     if settings is None:
@@ -218,7 +217,7 @@ def parse_profile(file, data, log):
 
 
 def _texts(file, name, value, row, needed, log):
-    """Tuple of texts of a list, () where there is none."""
+    """Return a tuple of texts of a list; () without a list."""
     raw = None if value is None else value.raw
     if raw is None or raw == []:
         if needed:
@@ -238,7 +237,7 @@ def _texts(file, name, value, row, needed, log):
 
 
 class _Teller:
-    """Tells what is wrong with a key of the profile, in its row."""
+    """Reports problems of a key of the profile, with its row."""
 
     def __init__(self, file, settings, sections, log):
         self.file, self.settings, self.sections, self.log = file, settings, sections, log
@@ -288,7 +287,7 @@ def _check_columns(values, tell):
 
 
 def _unknown_placeholders(line):
-    """What stands in braces and is none of the placeholders; of braces that are not in pairs {}."""
+    """Unknown placeholders in braces; {} for unpaired braces."""
     try:
         parts = list(string.Formatter().parse(line))
     except ValueError:

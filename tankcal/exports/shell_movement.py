@@ -1,12 +1,12 @@
-"""HyTD of gauges that hang on the shell: how far the head of the liquid draws their reference down.
+"""HyTD of gauges supported by the shell: downward movement of their reference by the head.
 
-A shell that bulges becomes shorter (membrane, no axial load): in a course of radius r and plate t
+A shell that bulges becomes shorter (membrane, no axial load). With radius r and plate t of a
+course:
 
     shortening(L) = sum over the courses of nu rho g / (E t) * integral of (L - z) r dz
 
-The gauge takes C = 0 for L < L_0, C = -(L - L_0) D for L >= L_0: two parameters, the line nearest
-to this curve. It corrects the level that the gauge shows; the head that the table has is another
-thing.
+The gauge applies C = 0 for L < L_0, C = -(L - L_0) D for L >= L_0, the two-parameter line nearest
+to this curve. It corrects the level shown by the gauge, independently of the head in the table.
 """
 
 from dataclasses import dataclass
@@ -15,20 +15,20 @@ import numpy as np
 
 from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 
-POISSON = 0.3
-_SAMPLES = 150
+POISSON = 0.3  # Poisson's ratio of the shell
+_SAMPLES = 150  # number of levels at which the line is compared with the curve
 
 
 @dataclass(frozen=True)
 class GaugeCorrection:
-    """The line C = -(L - L_0) D of a gauge, and how far it is from the movement at most.
+    """The line C = -(L - L_0) D of a gauge, and its largest distance from the movement.
 
     Attributes
     ----------
     start_m : float
-        L_0, the level below which nothing is corrected.
+        L_0, the level below which the correction is 0.
     factor : float
-        D, metres of movement by metre of level.
+        D, metres of movement per metre of level.
     off_m : float
         Largest distance of the line from the movement.
     """
@@ -39,7 +39,7 @@ class GaugeCorrection:
 
 
 def shortening_m(level_m, courses, density_kg_m3, e_pa, zero_m=0.0):
-    """How much shorter the shell is below the top at each level, m.
+    """Shortening of the shell at each level, m.
 
     Parameters
     ----------
@@ -48,13 +48,14 @@ def shortening_m(level_m, courses, density_kg_m3, e_pa, zero_m=0.0):
     courses : sequence of (height_m, thickness_m, radius_m)
         From the bottom up.
     density_kg_m3, e_pa : float
+        Density of the liquid, and Young's modulus of the shell.
     zero_m : float, optional
         Height of the zero of dips above the bottom.
 
     Examples
     --------
-    >>> one = shortening_m([8.0], [(8.0, 0.008, 7.2)], 1000, 206e9)
-    >>> print((1000 * one).round(3))  # nu rho g r h^2 / (2 E t)
+    >>> shortening = shortening_m([8.0], [(8.0, 0.008, 7.2)], 1000, 206e9)
+    >>> print((1000 * shortening).round(3))  # nu rho g r h^2 / (2 E t)
     [0.411]
     """
     surface = np.asarray(level_m, dtype=float) + zero_m
@@ -67,21 +68,21 @@ def shortening_m(level_m, courses, density_kg_m3, e_pa, zero_m=0.0):
 
 
 def gauge_correction(top_m, courses, density_kg_m3, e_pa, zero_m=0.0):
-    """The `GaugeCorrection` nearest to the shortening at any level up to the top.
+    """Return the `GaugeCorrection` nearest to the shortening at all levels up to the top.
 
     Parameters
     ----------
     top_m : float
         Highest dip.
     courses, density_kg_m3, e_pa, zero_m
-        As of `shortening_m`.
+        As in `shortening_m`.
     """
     from scipy.optimize import linprog, minimize_scalar
 
     even = np.linspace(0.0, top_m, _SAMPLES + 1)
 
     def best(start):
-        """(D, largest distance) of the best line from a level on: a linear programme."""
+        """(D, largest distance) of the best line from a level on, by linear programming."""
         level = np.append(even, start)
         true = shortening_m(level, courses, density_kg_m3, e_pa, zero_m)
         rise, scale = np.maximum(level - start, 0), true.max()

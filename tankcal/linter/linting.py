@@ -1,4 +1,4 @@
-"""From a file to findings."""
+"""Examine a file and return its findings."""
 
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -16,18 +16,26 @@ from tankcal.linter.volumes import Volumes, volumes_of
 from tankcal.messages import message
 from tankcal.text.display import table_html
 
-# Proportional parts beside a table: in proportion to each other, and to the table's own rise.
+# Proportional parts beside a table: proportional to each other, and to the rise of the table.
 
-MOST_PARTS = 15  # rows: 9 of a centimetre, 7 or 15 of an inch
+MOST_PARTS = 15  # largest number of rows: 9 for a centimetre, 7 or 15 for an inch
 _AS_THE_TABLE = 0.02
 
 
 def check_parts(table, main, log):
-    """Tell parts that are out of proportion, or unlike the rise of the main table.
+    """Report parts that are not proportional, or disagree with the rise of the main table.
 
-    table  of parts: marks 1, 2, ... and their volumes; main  (area low, area high), m2, of the
-    steps of the main table
-    Part j is rounded j * p: some p must lie between (v_j - q/2) / j and (v_j + q/2) / j for all j.
+    Parameters
+    ----------
+    table : Table
+        Table of parts: marks 1, 2, ... and their volumes.
+    main : (float, float)
+        Smallest and largest area of the steps of the main table, m2.
+    log : Log
+
+    Notes
+    -----
+    Part j is j * p, rounded. Some p must lie between (v_j - q/2) / j and (v_j + q/2) / j for all j.
     """
     entries = [e for e in table.entries if e.height.value and e.volume.value is not None]
     if len(entries) < 2:
@@ -74,18 +82,18 @@ def _check_size(table, entries, low, high, main, log):
         log.problem(table.name, text, entries[0].row, entries[0].volume_column)
 
 
-_PART_OF_LARGEST = 0.5  # of its rows: smaller tables beside it are not capacity tables
+_PART_OF_LARGEST = 0.5  # smallest share of the rows of the largest table of a capacity table
 _ROWS_OF_SLOPE = 10
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was found in a table.
+    """A finding about a table.
 
     Attributes
     ----------
     severity : str
-        "error", or "warning" for what only deserves a look.
+        "error" or "warning".
     problem : Problem
         With its row and column.
     """
@@ -98,7 +106,7 @@ class Finding:
 
     @property
     def text(self):
-        """The whole line as a Message."""
+        """The complete line as a Message."""
         said = self.problem.expected
         if self.severity == "error":
             text = message("is_error", "error: {text}", text=said)
@@ -109,14 +117,14 @@ class Finding:
 
 @dataclass(frozen=True, repr=False)
 class Report:
-    """What was found in the tables of a file.
+    """Findings about the tables of a file.
 
     Attributes
     ----------
     findings : tuple of Finding
         In the order of the file.
     summaries : tuple of str
-        One line about each table that was read.
+        One line about each table read.
     """
 
     findings: tuple[Finding, ...]
@@ -192,7 +200,7 @@ def lint(
 
 @dataclass(frozen=True)
 class CheckedTable:
-    """A table with what its checks made of it: all but `table` None where it cannot be read."""
+    """A table and the results of its checks; all results None if it cannot be read."""
 
     table: Table
     series: Series | None
@@ -202,7 +210,7 @@ class CheckedTable:
 
 @dataclass(frozen=True)
 class Checked:
-    """The report of a file, and the capacity tables that it is about, the longest ones."""
+    """Report of a file, and its capacity tables, the longest ones."""
 
     report: Report
     tables: tuple[CheckedTable, ...]
@@ -216,11 +224,21 @@ def checked(
     choose=None,
     even_steps=True,
 ):
-    """`Checked` tables of a file, as `lint` examines them.
+    """Return the `Checked` tables of a file, examined as in `lint`.
 
-    declared  Units (None for what is not) of columns whose headings name none
-    choose    function of the tables of all sheets that gives the number of the sheet to read;
-              None: that of the longest table
+    Parameters
+    ----------
+    path : path
+    nominal : Nominal, optional
+    sheet : str, optional
+        As in `lint`.
+    declared : Units, optional
+        Units of columns whose headings state none; None for unknown ones.
+    choose : callable, optional
+        Function of the tables of all sheets that returns the index of the sheet; None: the sheet
+        with the longest table.
+    even_steps : bool, optional
+        As in `lint`.
     """
     path, log = Path(path), Log()
     grids = read_grids(path, log)
@@ -251,7 +269,7 @@ def checked(
 
 
 def _declared(table, declared):
-    """The table with units that were declared, where its headings name none."""
+    """Return the table with declared units where its headings state none."""
     choices = table.volume_choices
     is_choice = not choices or declared.volume_m3 in choices
     is_settled = bool(choices) and is_choice and declared.volume_m3 is not None
@@ -264,7 +282,7 @@ def _declared(table, declared):
 
 
 def _tables(file, grids, sheet, log, choose=None):
-    """The tables of the sheet to be read; raises InputError where there is none."""
+    """Return the tables of the selected sheet; raise InputError if there is none."""
     if sheet is not None:
         names = [grid.sheet for grid in grids if grid.sheet]
         if sheet not in names:
@@ -302,9 +320,9 @@ def _tables(file, grids, sheet, log, choose=None):
 
 
 def _check(table, nominal, log, even_steps, has_several):
-    """(CheckedTable, summary, (least, largest) area in m2) of one table, its faults told.
+    """Return (CheckedTable, summary, (least, largest) area in m2) of one table; report its faults.
 
-    has_several  the summary names the column of volumes, since the file has more of them
+    has_several: whether the summary names the column of volumes, as the file has several.
     """
     if not table.has_heading:
         log.warning(
@@ -334,7 +352,7 @@ def _check(table, nominal, log, even_steps, has_several):
 
 
 def _areas(volumes, units):
-    """(least, largest) mean area of the cut over ten rows, m2."""
+    """Least and largest mean area of the cross section over ten rows, m2."""
     apart = min(_ROWS_OF_SLOPE, len(volumes.height) - 1)
     rise = volumes.volume[apart:] - volumes.volume[:-apart]
     area = rise / (volumes.height[apart:] - volumes.height[:-apart])

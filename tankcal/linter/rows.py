@@ -1,4 +1,4 @@
-"""The rows of a table in SI units, with what its last digits are worth: for other rooms to use."""
+"""Rows of a table in SI units, with the values of their last digits, for other packages."""
 
 from dataclasses import dataclass
 from math import gcd, isfinite
@@ -11,40 +11,39 @@ from tankcal.linter.totals import NO_UNITS, NOTHING_NOMINAL, likely_units
 from tankcal.messages import message
 
 _SAME_UNIT = 1e-6
-_SAME_TOP = 1e-3  # of height and volume: tables of one tank in two sheets
-_MOST_DIGITS = 6  # written after the mark: more are no rounding
-_SMALL_UNIT_M3, _THOUSANDS = 0.01, 3  # units of which nobody writes so many decimals
-_FEWEST_FOR_ROUNDING = 8  # rows
+_SAME_TOP = 1e-3  # relative difference of the tops of tables of one tank in two sheets
+_MOST_DIGITS = 6  # largest number of decimals of a rounded number
+_SMALL_UNIT_M3, _THOUSANDS = 0.01, 3  # unit and decimals that suggest a thousands separator
+_FEWEST_FOR_ROUNDING = 8  # fewest rows that show the rounding
 
 
 @dataclass(frozen=True)
 class TableRows:
-    """The rows of a capacity table as printed, in SI units, volumes rising.
+    """Rows of a capacity table as printed, in SI units, volumes rising.
 
     Attributes
     ----------
     name : str
-        Of the file, or file and sheet.
+        File, or file and sheet.
     row : (rows,) ndarray of int
-        Where each stands in the file.
+        Row numbers in the file.
     height_m : (rows,) ndarray
-        Strictly rising; of ullages minus the ullage.
+        Strictly rising; minus the ullage for ullages.
     volume_m3 : (rows,) ndarray
     height_rounding_m : (rows,) ndarray
-        Largest rounding error of each height; 0 where the steps are even.
+        Largest rounding error of each height; 0 if the steps are even.
     height_quantum_m : float
-        Twice the usual one of them.
+        Twice the usual rounding error of a height.
     volume_quantum_m3 : float
-        Last digit, or 2, 5, 10 ... of it where all volumes are whole multiples of that; 0 where
-        they were not rounded.
+        Last digit, or 2, 5, 10 ... of it if all volumes are multiples; 0 if not rounded.
     is_ullage : bool
     U_m3, u_m3 : (rows,) ndarray or None
-        Expanded or standard uncertainties, whichever stands beside the volumes.
+        Expanded or standard uncertainties, whichever the table has.
     k : float or None
-        Coverage factor that the table names: of rows that have different ones the median.
+        Coverage factor in the table; the median if rows differ.
     height_unit_m, volume_unit_m3 : float
     joints_m : tuple of float
-        Heights at which the area of the cut jumps, or its derivative.
+        Heights at which the area of the cross section or its derivative jumps.
     """
 
     name: str
@@ -64,31 +63,31 @@ class TableRows:
 
 
 def read_rows(path, log, sheet=None, declared=NO_UNITS, volume_column=None):
-    """(`TableRows` or None, `Report`) of the capacity table in a file.
+    """Return (`TableRows` or None, `Report`) of the capacity table in a file.
 
     Parameters
     ----------
     path : path
-        As of `lint`.
+        As in `lint`.
     log : Log
-        Gets what keeps the rows from being used although the linter finds no error: units or
-        columns that are not clear, uncertainties that cannot be read.
+        Receives problems that prevent use of the rows although the linter finds no error: ambiguous
+        units or columns, unreadable uncertainties.
     sheet : str, optional
-        None: that of the longest table, or of one of the same tank that has uncertainties.
+        None: the sheet with the longest table, or a sheet of the same tank with uncertainties.
     declared : Units
-        Sizes of units of columns whose headings name none.
+        Sizes of units of columns whose headings state none.
     volume_column : str, optional
-        Heading of the column to read, where there are several.
+        Heading of the column of volumes, if there are several.
 
     Returns
     -------
     (TableRows or None, Report)
-        None where the report has errors, or after telling `log`.
+        None if the report has errors, or after reporting to `log`.
 
     Raises
     ------
     InputError
-        For a file that cannot be read or holds no table.
+        If the file cannot be read or contains no table.
     """
     choose = None if sheet is not None else _sheet_with_uncertainties
     found = checked(path, NOTHING_NOMINAL, sheet, declared, choose)
@@ -104,7 +103,7 @@ def read_rows(path, log, sheet=None, declared=NO_UNITS, volume_column=None):
 
 
 def _sheet_with_uncertainties(sheets):
-    """Number of the sheet of the longest table, or of one of the same tank that says more."""
+    """Index of the sheet with the longest table, or with uncertainties of the same tank."""
     longest = [max(tables, key=lambda one: len(one.entries), default=None) for tables in sheets]
     sizes = [0 if one is None else len(one.entries) for one in longest]
     best = sizes.index(max(sizes))
@@ -119,7 +118,7 @@ def _sheet_with_uncertainties(sheets):
 
 
 def _top(table):
-    """(height, volume) of the last row of a table, in SI as far as units are named; or None."""
+    """(height, volume) of the last row of a table, in SI if its units are stated; or None."""
     last = table.entries[-1]
     if last.height.value is None or last.volume.value is None:
         return None
@@ -128,7 +127,7 @@ def _top(table):
 
 
 def _the_table(tables, volume_column, log):
-    """The one to read; None after telling `log` that there is none, or more than one."""
+    """Return the selected table; None after reporting that there is none, or more than one."""
     names = [str(one.table.entries[0].volume_column) for one in tables]
     if volume_column is not None:
         named = [
@@ -162,7 +161,7 @@ def _the_table(tables, volume_column, log):
 
 
 def _agree(one, other):
-    """Whether two tables say the same, as one in m3 beside one in litres does."""
+    """Whether two tables contain equal values, such as one in m3 and one in litres."""
     h, v = _in_si(one)
     h2, v2 = _in_si(other)
     between = np.interp(h2, h, v)
@@ -174,7 +173,7 @@ def _in_si(one):
 
 
 def _has_clear_units(one, declared, log):
-    """Whether headings name the units, or only one pair of units makes a tank of this table."""
+    """Whether headings state the units, or only one pair of units is plausible for a tank."""
     if not _agrees_with_headings(one, declared, log):
         return False
     if None not in (one.table.height_unit_m, one.table.volume_unit_m3):
@@ -201,7 +200,7 @@ def _has_clear_units(one, declared, log):
 
 
 def _agrees_with_headings(one, declared, log):
-    """Whether units that were declared are those of the headings, where these name any."""
+    """Whether declared units agree with the units in the headings."""
     told = len(log.problems)
     choices = one.table.volume_choices
     if choices and declared.volume_m3 is not None and declared.volume_m3 not in choices:
@@ -229,7 +228,7 @@ def _agrees_with_headings(one, declared, log):
 
 
 def _has_clear_marks(one, log):
-    """Whether 1.327 is 1.327: three decimals of a litre rather look like thousands."""
+    """Whether 1.327 is 1.327; three decimals of a litre are more likely thousands."""
     entries = [entry for entry in one.series.entries if entry.volume.value]
     is_typed = all(entry.volume.is_typed and not entry.volume.marks for entry in entries)
     is_fine = one.units.volume_m3 < _SMALL_UNIT_M3
@@ -273,7 +272,7 @@ def _rows(one, log):
 
 
 def _quantum(volume, decimals):
-    """1, 2 or 5 of a decimal place that all volumes are whole multiples of; 0: not rounded."""
+    """1, 2 or 5 times a power of ten of which all volumes are multiples; 0: not rounded."""
     if decimals > _MOST_DIGITS:
         return 0.0
     digits = np.rint(volume * 10.0**decimals)
@@ -284,7 +283,7 @@ def _quantum(volume, decimals):
 
 
 def _uncertainties(table, entries, units, log):
-    """((rows,) in m3 or None, whether expanded, k or None) that stand beside the volumes."""
+    """Return ((rows,) in m3 or None, whether expanded, k or None) from the columns of the table."""
     said = table.uncertainty
     if said is None:
         return None, True, None
