@@ -86,15 +86,15 @@ class Written:
         fewest, before = np.full(count, chords.NEVER), np.full(count, -1)
         if self.loops is chords:
             fewest, before = fewest.tolist(), before.tolist()
-        given = self._for_loops(*self.lines, self.last, is_open)
-        self.loops.fewest_chords(*given, eps, most, fewest, before)
+        arrays = self._for_loops(*self.lines, self.last, is_open)
+        self.loops.fewest_chords(*arrays, eps, most, fewest, before)
         return np.asarray(fewest), np.asarray(before)
 
     def longest_chords(self, is_open, eps):
         """Rows of the path of longest chords within eps; empty if there is none."""
         rows = np.zeros(len(self.height), dtype=int)
-        given = self._for_loops(*self.lines, self.last, is_open)
-        return rows[: self.loops.longest_chords(*given, eps, rows)]
+        arrays = self._for_loops(*self.lines, self.last, is_open)
+        return rows[: self.loops.longest_chords(*arrays, eps, rows)]
 
     def error_of(self, rows):
         """Largest error of chords at rows between, and of the rows themselves."""
@@ -103,7 +103,7 @@ class Written:
 
     def _for_loops(self, *arrays):
         """Arrays for compiled loops, lists for plain loops, which access lists faster."""
-        return [one.tolist() for one in arrays] if self.loops is chords else arrays
+        return [array.tolist() for array in arrays] if self.loops is chords else arrays
 
     def reversed(self):
         """Return the table from its top down."""
@@ -111,7 +111,7 @@ class Written:
         must = np.zeros(count, dtype=bool)
         must[self.last] = must[0] = True
         return Written(
-            *(np.ascontiguousarray(-one[::-1]) for one in self.lines),
+            *(np.ascontiguousarray(-line[::-1]) for line in self.lines),
             _next_fixed(must[::-1]),
             np.ascontiguousarray(self.is_open[::-1]),
             self.loops,
@@ -182,12 +182,12 @@ def fewest_breakpoints(height, volume, error, *, fixed=(), at=None, written=None
         rows = _way(table, eps, chords.NEVER)
         if rows is None:
             return None
-        found = best_breakpoints(
+        best = best_breakpoints(
             height, volume, len(rows), fixed=fixed, at=at, written=written, candidates=candidates
         )
-        if found.error <= error * (1 + _CLOSE):
-            return found
-        eps -= max(found.error - error, 0.01 * error)
+        if best.error <= error * (1 + _CLOSE):
+            return best
+        eps -= max(best.error - error, 0.01 * error)
     return None
 
 
@@ -205,7 +205,7 @@ def polyline_error(height, volume, at, written, rows):
 
 
 def _table(height, volume, fixed, at, written, candidates):
-    height, volume = (np.ascontiguousarray(one, dtype=float) for one in (height, volume))
+    height, volume = (np.ascontiguousarray(values, dtype=float) for values in (height, volume))
     at = height if at is None else np.ascontiguousarray(at, dtype=float)
     written = volume if written is None else np.ascontiguousarray(written, dtype=float)
     must = np.zeros(len(height), dtype=bool)
@@ -262,7 +262,9 @@ def _greedy(table, points):
     """(rows, error) of the better of the two greedy solutions, from the bottom and from the top."""
     up = _greedy_way(table, points)
     down = len(table.height) - 1 - _greedy_way(table.reversed(), points)[::-1]
-    error, rows = min(((table.error_of(rows), rows) for rows in (up, down)), key=lambda one: one[0])
+    error, rows = min(
+        ((table.error_of(rows), rows) for rows in (up, down)), key=lambda solution: solution[0]
+    )
     return rows, error
 
 
@@ -300,8 +302,8 @@ def _optimum(table, points, rows):
             low = eps
             continue
         step *= 2
-        rows, found = better, table.error_of(better)
-        high = max(min(found, eps), low)
+        rows, best = better, table.error_of(better)
+        high = max(min(best, eps), low)
         table = _kept(table, high, points)
     return rows
 

@@ -73,15 +73,19 @@ class Asked:
             if grid == "every row":
                 rows = _less_shifted_top(marks, rows, self.height)
             read = slice(int(rows[-1]) + 1) if grid == "every row" else slice(None)
-            given = (self.height[read], self.volume[read], marks.at_m, marks.written_m3, rows)
-            return (rows, *judge(*given)) if len(rows) > 1 else (rows, 0.0, 0.0)
+            table = (self.height[read], self.volume[read], marks.at_m, marks.written_m3, rows)
+            return (rows, *judge(*table)) if len(rows) > 1 else (rows, 0.0, 0.0)
         if "volume" not in self.profile.columns:
             text = message("export_increments_only", "has volumes of increments only; expected "
                            "every row there: leave out --points and --max-error-l")  # fmt: skip
             self.tell(text, "table.columns")
             return np.array(fixed), 0.0, 0.0
-        found = self._breakpoints(marks, fixed)
-        return (np.array(fixed), 0.0, 0.0) if found is None else (found.rows, found.error, found.at)
+        solution = self._breakpoints(marks, fixed)
+        return (
+            (np.array(fixed), 0.0, 0.0)
+            if solution is None
+            else (solution.rows, solution.error, solution.at)
+        )
 
     def _breakpoints(self, marks, fixed):
         more = int(self.is_zero_left_out)
@@ -91,37 +95,41 @@ class Asked:
             text = message("export_how_many", "no limit of points is known; expected --points or "
                            "--max-error-l")  # fmt: skip
             return self.tell(text, "table.max_points")
-        given = dict(fixed=fixed, at=marks.at_m, written=marks.written_m3, candidates=marks.stands)
+        options = dict(
+            fixed=fixed, at=marks.at_m, written=marks.written_m3, candidates=marks.stands
+        )
         table, is_spline = (self.height, self.volume), self.profile.interpolation == "spline"
         if self.max_error_m3 is not None:
-            return self._within(table, given, is_spline, most)
+            return self._within(table, options, is_spline, most)
         points = min(points + more, len(self.height))
         if points < len(fixed):
             text = message("export_few_points", "{points} points; expected {least} or more: the "
                            "ends and the critical zone have to stand", points=points - more,
                            least=len(fixed) - more)  # fmt: skip
             return self.tell(text, "table.max_points")
-        found = (spline_breakpoints if is_spline else best_breakpoints)(*table, points, **given)
-        return found if found is not None else self._tell_no_spline()
+        solution = (spline_breakpoints if is_spline else best_breakpoints)(
+            *table, points, **options
+        )
+        return solution if solution is not None else self._tell_no_spline()
 
-    def _within(self, table, given, is_spline, most):
+    def _within(self, table, options, is_spline, most):
         """Fewest rows within the requested error, reduced by the error of the table itself."""
         error = self.max_error_m3 - self.own_m3
         if is_spline:
             most = min(most or _MOST_OF_SPLINE, len(self.height))
-            found = fewest_spline_breakpoints(*table, error, most=most, **given)
+            solution = fewest_spline_breakpoints(*table, error, most=most, **options)
         else:
-            found = fewest_breakpoints(*table, error, **given) if error > 0 else None
-        if found is None:
-            rows = np.flatnonzero(given["candidates"])
-            least = polyline_error(*table, given["at"], given["written"], rows)[0] + self.own_m3
+            solution = fewest_breakpoints(*table, error, **options) if error > 0 else None
+        if solution is None:
+            rows = np.flatnonzero(options["candidates"])
+            least = polyline_error(*table, options["at"], options["written"], rows)[0] + self.own_m3
             text = message(
                 "export_not_within", "no rows keep {asked:.4g} L: all of them, rounded as the "
                 "profile writes them, err by {least:.4g} L", asked=1000 * self.max_error_m3,
                 least=1000 * least,
             )  # fmt: skip
             self.tell(text, "--max-error-l")
-        return found
+        return solution
 
     def _tell_no_spline(self):
         self.tell(message("export_no_spline", "no spline of so many points rises everywhere; "

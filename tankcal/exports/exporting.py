@@ -117,9 +117,9 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
         "level_unit": profile.increment if profile.leading == "increments" else profile.level_unit,
         "volume_unit": profile.volume_unit,
     }  # fmt: skip
-    text = file_text(body, profile, [say(words, one) for one in facts], values)
+    text = file_text(body, profile, [say(words, fact) for fact in facts], values)
     data = text.encode(profile.encoding)
-    own, off_mark = asked.own_m3, np.abs(marks.at_m[listed] - height[listed]) > ON_THE_MARK_M
+    own_errors, off_mark = asked.own_m3, np.abs(marks.at_m[listed] - height[listed]) > ON_THE_MARK_M
     read_back(
         data,
         body,
@@ -129,7 +129,7 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
     )
     return Export(
         profile, record.job.tank.id, marks.at_m[listed], marks.written_m3[listed], len(height),
-        error + own, at, own, int(off_mark.sum()), gauge, tuple(facts), data,
+        error + own_errors, at, own_errors, int(off_mark.sum()), gauge, tuple(facts), data,
         None if rows[-1] == len(height) - 1 else float(height[-1]),
     )  # fmt: skip
 
@@ -143,15 +143,15 @@ def write_export(export, out, language="en"):
     """Write the file and its report (NAME-report.txt), both or none; return their paths."""
     out, words = Path(out), load_words(language)
     report = out.with_name(f"{out.stem}-report.txt")
-    lines = [say(words, one) for one in (*export.lines, *export.facts)]
-    made = {out: export.data, report: "".join(f"{one}\n" for one in lines).encode()}
+    lines = [say(words, line) for line in (*export.lines, *export.facts)]
+    contents = {out: export.data, report: "".join(f"{line}\n" for line in lines).encode()}
     waiting = {}
-    for path in made:
+    for path in contents:
         if path.is_dir():  # reported before any file is written
             raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(path))
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        for path, data in made.items():
+        for path, data in contents.items():
             waiting[path] = path.with_name(f".{path.name}.{os.getpid()}.tmp")
             waiting[path].write_bytes(data)
         for path, temporary in waiting.items():
@@ -159,7 +159,7 @@ def write_export(export, out, language="en"):
     finally:
         for temporary in waiting.values():
             temporary.unlink(missing_ok=True)
-    return [*made]
+    return [*contents]
 
 
 def _check_table(file, record, log):
@@ -174,7 +174,7 @@ def _check_table(file, record, log):
                        "rows or more that do, with a volume each")  # fmt: skip
         log.problem(file, text, None, "capacity.height_m")
     columns = ("k", "stated_U_m3")
-    if any(len(getattr(record.capacity, one)) != len(height) for one in columns):
+    if any(len(getattr(record.capacity, column)) != len(height) for column in columns):
         text = message("export_columns", "columns of different lengths; expected one value a row")
         log.problem(file, text, None, "capacity.stated_U_m3")
 
@@ -184,8 +184,10 @@ def _gauge(file, record, log):
 
     None after reporting why there is none.
     """
-    head = next((one.value for one in record.choices if one.code == "head"), None)
-    courses = [(one.height_m, one.thickness_m, one.inside_radius_m) for one in record.courses]
+    head = next((choice.value for choice in record.choices if choice.code == "head"), None)
+    courses = [
+        (course.height_m, course.thickness_m, course.inside_radius_m) for course in record.courses
+    ]
     if not courses or min(thickness for _, thickness, _ in courses) <= 0:
         text = message("export_no_plates", "has no courses with the thickness of their plates; "
                        "expected them for --gauge-on-shell")  # fmt: skip

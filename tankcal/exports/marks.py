@@ -81,9 +81,9 @@ def marks_of(height_m, volume_m3, profile, reference_m=None, must=()):
 
 def _quanta(values, quantum, offset):
     if offset == 0:
-        return [to_quanta(one, quantum) for one in values.tolist()]
+        return [to_quanta(value, quantum) for value in values.tolist()]
     half = Fraction(1, 2)
-    return [floor((Fraction(one) - offset) / quantum + half) for one in values.tolist()]
+    return [floor((Fraction(value) - offset) / quantum + half) for value in values.tolist()]
 
 
 def _standing(height_m, at_m, level, must):

@@ -64,7 +64,7 @@ _TEXTS = (
     message("profile_own_choice", "own choice of tankcal"),
     message("profile_from_memory", "from memory: 1, 4 or 20 points"),
 )
-_KNOWN = {str(one): one for one in _TEXTS}
+_KNOWN = {str(text): text for text in _TEXTS}
 
 
 def as_message(text):

@@ -139,7 +139,7 @@ class Profile:
     @property
     def leading(self):
         """The leading column of levels: dip, ullage or increments."""
-        return next(one for one in self.columns if one in LEVEL_COLUMNS)
+        return next(column for column in self.columns if column in LEVEL_COLUMNS)
 
     @property
     def level_quantum_m(self):
@@ -191,11 +191,11 @@ def _read(path):
 
 def parse_profile(file, data, log):
     """Return the Profile in the bytes of a TOML file; None after reporting its problems."""
-    told = len(log.problems)
+    problems_before = len(log.problems)
     settings, sections = read_toml(file, data, log)
     if settings is None:
         return None
-    for section in [one for one in settings if one not in FIELDS]:
+    for section in [setting for setting in settings if setting not in FIELDS]:
         text = message(
             "export_section", "unknown section; expected one of {names}{hint}",
             names=list(FIELDS), hint=nearest(section, FIELDS),
@@ -203,17 +203,17 @@ def parse_profile(file, data, log):
         log.problem(file, text, sections.get(section), f"[{section}]")
     values = {}
     for section, fields in FIELDS.items():
-        given, row = dict(settings.get(section, {})), sections.get(section)
-        for (_, key), needed in (one for one in LISTS.items() if one[0][0] == section):
+        stated, row = dict(settings.get(section, {})), sections.get(section)
+        for (_, key), needed in (entry for entry in LISTS.items() if entry[0][0] == section):
             place = (file, f"{section}.{key}")
-            values[section, key] = _texts(*place, given.pop(key, None), row, needed, log)
-        read = read_section(file, section, fields, given, row, log)
+            values[section, key] = _texts(*place, stated.pop(key, None), row, needed, log)
+        read = read_section(file, section, fields, stated, row, log)
         values |= {(section, key): value for key, value in read.items()}
     tell = _Teller(file, settings, sections, log)
     _check_columns(values, tell)
     _check_table(values, tell)
     _check_marks(values, tell)
-    return _profile(file, values) if len(log.problems) == told else None
+    return _profile(file, values) if len(log.problems) == problems_before else None
 
 
 def _texts(file, name, value, row, needed, log):
@@ -225,8 +225,8 @@ def _texts(file, name, value, row, needed, log):
                         row, name)  # fmt: skip
         return ()
     sound = isinstance(raw, list) and len(raw) <= MOST_LINES
-    if not sound or not all(isinstance(one, str) and one.isprintable() and len(one) <= 300
-                            for one in raw):  # fmt: skip
+    if not sound or not all(isinstance(text, str) and text.isprintable() and len(text) <= 300
+                            for text in raw):  # fmt: skip
         text = message(
             "export_texts", "found {found}; expected a list of at most {most} texts, each of one "
             "line", found=shown(raw), most=MOST_LINES,
@@ -352,11 +352,11 @@ def _profile(file, values):
         for key in ("unit", "decimals")
     }
     whole = {"min_points", "max_points", "level_decimals", "volume_decimals", "digits"}
-    given = {}
+    settings = {}
     for place, value in values.items():
         name = renamed.get(place, place[1])
         if value is not None:
-            given[name] = int(value) if name in whole else value
-    for name in given.keys() & {"name", "source", "remark"}:
-        given[name] = as_message(given[name])
-    return Profile(code=file.removesuffix(_ENDING), **given)
+            settings[name] = int(value) if name in whole else value
+    for name in settings.keys() & {"name", "source", "remark"}:
+        settings[name] = as_message(settings[name])
+    return Profile(code=file.removesuffix(_ENDING), **settings)

@@ -87,12 +87,12 @@ def gauge_correction(top_m, courses, density_kg_m3, e_pa, zero_m=0.0):
         true = shortening_m(level, courses, density_kg_m3, e_pa, zero_m)
         rise, scale = np.maximum(level - start, 0), true.max()
         rows = np.column_stack([np.append(rise, -rise), np.full(2 * len(rise), -1.0)])
-        found = linprog([0, 1], rows, np.append(true, -true) / scale, bounds=[(0, None)] * 2)
-        return found.x * scale
+        solution = linprog([0, 1], rows, np.append(true, -true) / scale, bounds=[(0, None)] * 2)
+        return solution.x * scale
 
     starts = np.linspace(0.0, 0.9 * top_m, 31)
     nearest = int(np.argmin([best(start)[1] for start in starts]))
     bounds = starts[max(nearest - 1, 0)], starts[min(nearest + 1, 30)]
-    start = minimize_scalar(lambda one: best(one)[1], bounds=bounds, method="bounded").x
+    start = minimize_scalar(lambda level: best(level)[1], bounds=bounds, method="bounded").x
     factor, off = best(start)
     return GaugeCorrection(float(start), float(factor), float(off))

@@ -46,9 +46,9 @@ def fewest_spline_breakpoints(height, volume, error, *, most, **given):
     low, high, best = 2, most, None
     while low <= high:
         points = (low + high) // 2
-        found = spline_breakpoints(height, volume, points, **given)
-        if found is not None and found.error <= error:
-            best, high = found, min(points, len(found.rows)) - 1
+        solution = spline_breakpoints(height, volume, points, **given)
+        if solution is not None and solution.error <= error:
+            best, high = solution, min(points, len(solution.rows)) - 1
         else:
             low = points + 1
     return best
@@ -64,7 +64,7 @@ class _Seeker:
     """A table, its rows as written, and splines through some of them."""
 
     def __init__(self, height, volume, at, written):
-        self.height, self.volume = (np.asarray(one, dtype=float) for one in (height, volume))
+        self.height, self.volume = (np.asarray(values, dtype=float) for values in (height, volume))
         self.at = self.height if at is None else np.asarray(at, dtype=float)
         self.written = self.volume if written is None else np.asarray(written, dtype=float)
 

@@ -15,9 +15,9 @@ from tankcal.messages import message
 from tankcal.tank.dips import dip_label
 
 _READ_AS = {"dip": "height", "ullage": "ullage", "increments": "height"}
-_UNITS_READ = {one: one for one in ("m", "cm", "mm", "in", "ft", "m3", "L", "bbl", "hL", "ft3")} | {
-    "gal": "US gal"
-}  # names of units known to the linter
+_UNITS_READ = {
+    unit: unit for unit in ("m", "cm", "mm", "in", "ft", "m3", "L", "bbl", "hL", "ft3")
+} | {"gal": "US gal"}  # names of units known to the linter
 _FEW = 3  # fewest rows required by the linter
 _BY_NEIGHBOURS = ("lint_odd_volume", "lint_shifted", "lint_volumes_swapped", "lint_rough")
 _OF_UNITS = ("lint_no_units",)  # finding about a heading without a unit
@@ -84,13 +84,13 @@ def file_text(body, profile, facts, values):
     """
     head = [line.format(**values) for line in profile.header]
     if profile.provenance:
-        head += [f"{profile.comment} {one}".strip() for one in facts]
+        head += [f"{profile.comment} {fact}".strip() for fact in facts]
     if profile.headings:
         head.append(profile.separator.join(profile.headings))
     end = LINE_ENDS[profile.line_end]
-    lines = [plain(one, profile.encoding) for one in head]
+    lines = [plain(line, profile.encoding) for line in head]
     lines += [profile.separator.join(cells) for cells in body]
-    return "".join(f"{one}{end}" for one in lines)
+    return "".join(f"{line}{end}" for line in lines)
 
 
 def plain(text, encoding):
@@ -138,13 +138,13 @@ def read_back(data, body, profile, is_even=False, rounded=0):
     entries = max((table.entries for table in tables), key=len, default=())
     _refuse_other_rows(entries, body, profile)
     findings = [
-        one
-        for one in report.findings
-        if not _is_of_profile(one, len(body), profile) and not _is_of_tank(one, is_even)
+        finding
+        for finding in report.findings
+        if not _is_of_profile(finding, len(body), profile) and not _is_of_tank(finding, is_even)
     ]
     if findings:
-        told = [_finding(one, profile) for one in findings[:_MOST_TOLD]]
-        raise InputError([*_rounded(rounded, profile), *told])
+        shown = [_finding(finding, profile) for finding in findings[:_MOST_TOLD]]
+        raise InputError([*_rounded(rounded, profile), *shown])
 
 
 def _rounded(count, profile):
@@ -202,13 +202,13 @@ def _refuse_other_rows(entries, body, profile):
     if "volume" in profile.columns:
         volume = profile.columns.index("volume")
         same = same and all(
-            one.volume.value == _number(cells[volume], profile) / 10**profile.volume_decimals
-            for one, cells in zip(entries, body, strict=False)
+            entry.volume.value == _number(cells[volume], profile) / 10**profile.volume_decimals
+            for entry, cells in zip(entries, body, strict=False)
         )
     if profile.level_unit not in MARKED or profile.leading == "increments":
         same = same and all(
-            one.height.value == float(cells[level].replace(profile.decimal, "."))
-            for one, cells in zip(entries, body, strict=False)
+            entry.height.value == float(cells[level].replace(profile.decimal, "."))
+            for entry, cells in zip(entries, body, strict=False)
         )
     if not same:
         text = message(

@@ -85,7 +85,7 @@ class Block:
 def blocks_of(grid):
     """Return the `Block`s of a grid; a text without headings is one block of columns 1 and 2."""
     rows = list(grid.rows)
-    found, start, is_parts, end = [], None, False, 0
+    blocks, start, is_parts, end = [], None, False, 0
     first_pages = {}
     index = 0
     while index < len(rows):
@@ -112,14 +112,14 @@ def blocks_of(grid):
             index += 1
             continue
         pairs = _as_first_page(pairs, wide, first_pages)
-        found.append((first, pairs, heading, is_parts, index if start is None else start, wide))
+        blocks.append((first, pairs, heading, is_parts, index if start is None else start, wide))
         is_parts, start, index, end = False, None, first, first
-    if not found:
+    if not blocks:
         return _without_heading(grid.name, rows) if grid.is_text else ()
-    ends = [heading_start for *_, heading_start, _ in found[1:]] + [len(rows)]
+    ends = [heading_start for *_, heading_start, _ in blocks[1:]] + [len(rows)]
     return tuple(
         _block(grid, pairs, tuple(rows[first:end]), parts, heading, wide)
-        for (first, pairs, heading, parts, _, wide), end in zip(found, ends, strict=True)
+        for (first, pairs, heading, parts, _, wide), end in zip(blocks, ends, strict=True)
     )
 
 
@@ -173,7 +173,7 @@ def _with_title(pair, above):
     named = pair.volume_heading.named
     if named.choices:
         texts = [cell for line in above for cell in line if isinstance(cell, str)]
-        sizes = {found[0] for text in texts if len(found := countries_in(text)) == 1}
+        sizes = {countries[0] for text in texts if len(countries := countries_in(text)) == 1}
         if len(sizes) == 1:
             named = Unit(named.factor * sizes.pop(), named.factor, named.is_multiplied)
     elif not named.is_named:
@@ -242,9 +242,9 @@ def _pairs(cells):
 def _pairs_of_run(heights, volumes):
     if not volumes:
         return []
-    dips = [one for one in heights if one[1].role == "height"] or heights
-    dips = [one for one in dips if not one[1].named.complaint] or dips
-    volumes = [one for one in volumes if not one[1].named.complaint] or volumes[:1]
+    dips = [height for height in heights if height[1].role == "height"] or heights
+    dips = [height for height in dips if not height[1].named.complaint] or dips
+    volumes = [volume for volume in volumes if not volume[1].named.complaint] or volumes[:1]
     (place, heading), *parts = dips
     return [Pair(place, k, heading, volume, parts=tuple(parts)) for k, volume in volumes]
 
@@ -254,17 +254,21 @@ def _with_uncertainty(pairs, cells):
     starts = [min(pair.height, pair.volume) for pair in pairs if pair.height] + [len(cells)]
     for pair in pairs:
         end = min(start for start in starts if start > pair.volume)
-        end = min([end, *(other.volume for other in pairs if other.volume > pair.volume)])
-        said = {n: uncertainty_of(cells[n]) for n in range(pair.volume + 1, end)}
-        known = sorted((n for n in said if said[n]), key=lambda n: not said[n].is_expanded)
+        end = min(
+            [end, *(following.volume for following in pairs if following.volume > pair.volume)]
+        )
+        announced = {n: uncertainty_of(cells[n]) for n in range(pair.volume + 1, end)}
+        known = sorted(
+            (n for n in announced if announced[n]), key=lambda n: not announced[n].is_expanded
+        )
         if not known:
             yield pair
             continue
         beside = {"uncertainty": known[0]}
-        factors = [n for n in said if said[n] is None and is_coverage_factor(cells[n])]
+        factors = [n for n in announced if announced[n] is None and is_coverage_factor(cells[n])]
         if factors:
             beside["k"] = factors[0]
-        yield replace(pair, beside=beside, uncertainty=said[known[0]])
+        yield replace(pair, beside=beside, uncertainty=announced[known[0]])
 
 
 def trimmed(cells):
@@ -306,7 +310,7 @@ def _refuse_half_a_heading(name, rows):
         roles = {heading.role for heading in headings} - {""}
         if len(texts) < 2 or not roles:
             continue
-        refused = next((one for one in headings if one.named.complaint), None)
+        refused = next((heading for heading in headings if heading.named.complaint), None)
         if refused is not None:
             raise InputError(Problem(name, refused.named.complaint, row, refused.text))
         text = message(

@@ -71,23 +71,25 @@ def leave_one_out(rows):
     stretch = np.searchsorted(rows.joints, sound, side="right")
     low = np.searchsorted(stretch, stretch, side="left")
     high = np.searchsorted(stretch, stretch, side="right")
-    own = np.flatnonzero(high - low >= FEWEST_ROWS)
-    if len(own) == 0:
+    screened = np.flatnonzero(high - low >= FEWEST_ROWS)
+    if len(screened) == 0:
         return difference, allowed
-    start = np.clip(own - WINDOW // 2, low[own], np.maximum(low[own], high[own] - WINDOW))
+    start = np.clip(
+        screened - WINDOW // 2, low[screened], np.maximum(low[screened], high[screened] - WINDOW)
+    )
     place = start[:, None] + np.arange(WINDOW)
-    is_in = place < high[own][:, None]
+    is_in = place < high[screened][:, None]
     others = sound[np.minimum(place, len(sound) - 1)]
-    row = sound[own]
+    row = sound[screened]
     apart = (rows.height[others] - rows.height[row][:, None]) * is_in
     apart /= np.abs(apart).max(axis=1)[:, None]
     weight = rows.weight[others] * is_in
     basis = apart[..., None] ** np.arange(DEGREE + 1) * weight[..., None]
     values = (rows.volume[others] - rows.volume[row][:, None]) * weight
     q, _ = np.linalg.qr(basis)
-    number = np.arange(len(own))
-    hat = np.einsum("nk,njk->nj", q[number, own - start], q)
-    leverage = hat[number, own - start]
+    number = np.arange(len(screened))
+    hat = np.einsum("nk,njk->nj", q[number, screened - start], q)
+    leverage = hat[number, screened - start]
     spared = np.maximum(1 - leverage, LEAST_SPARED)
     difference[row] = -np.einsum("nj,nj->n", hat, values) / spared
     weights = (np.abs(hat).sum(axis=1) - leverage) / spared
@@ -241,7 +243,7 @@ def _slopes_around(slope):
 
 def _reopen(rows, joint):
     """Examine rows again without a joint that leaves more than rounding."""
-    rows.joints = [one for one in rows.joints if one != joint]
+    rows.joints = [kept_joint for kept_joint in rows.joints if kept_joint != joint]
     rows.is_settled[max(joint - _SECOND_LOOK, 0) : joint + _SECOND_LOOK] = False
 
 
@@ -255,10 +257,10 @@ def _beyond_joint(rows, best, moved):
         return best
     joint = beside[0]
     moved.add(joint)
-    rows.joints = [one for one in rows.joints if one != joint]
-    other = explain(rows, best.rows[0])
-    if other.kind == "joint" and other.rows[0] != joint:
-        return other
+    rows.joints = [near_joint for near_joint in rows.joints if near_joint != joint]
+    alternative = explain(rows, best.rows[0])
+    if alternative.kind == "joint" and alternative.rows[0] != joint:
+        return alternative
     rows.joints = sorted([*rows.joints, joint])
     return best
 

@@ -55,10 +55,10 @@ def feet_reader(name, cells, heading, rows, log):
     """
     cells = [(cell, row) for cell, row in zip(cells, rows, strict=True) if has_digit(cell)]
     texts = [_typed(cell) if isinstance(cell, str) else "" for cell, _ in cells]
-    most, said = len(texts) / 2, parts_of_inch(heading.text)
+    most, unit_of_parts = len(texts) / 2, parts_of_inch(heading.text)
     in_parts = [_PARTS.fullmatch(text) for text in texts]
-    if sum(one is not None for one in in_parts) > most:
-        unit = said or _parts_by_shape(name, in_parts, [row for _, row in cells], log)
+    if sum(in_part is not None for in_part in in_parts) > most:
+        unit = unit_of_parts or _parts_by_shape(name, in_parts, [row for _, row in cells], log)
         return lambda cell: _read_parts(cell, unit)
     in_fractions = sum(_FRACTION.fullmatch(text) is not None for text in texts)
     is_told = heading.is_in_feet or any("/" in text for text in texts)
@@ -101,10 +101,10 @@ def fraction_reader(cells, heading, style):
 
 def number_with_fraction(cell):
     """Return the Fraction of a cell such as 10 1/4, 10-1/4, 10¼ or 3/8; None for any other cell."""
-    found = _WITH_FRACTION.fullmatch(_typed(cell)) if isinstance(cell, str) else None
-    if found is None or not 0 <= int(found[2]) < int(found[3]):
+    match = _WITH_FRACTION.fullmatch(_typed(cell)) if isinstance(cell, str) else None
+    if match is None or not 0 <= int(match[2]) < int(match[3]):
         return None
-    return int(found[1] or 0) + Fraction(int(found[2]), int(found[3]))
+    return int(match[1] or 0) + Fraction(int(match[2]), int(match[3]))
 
 
 def _no_fraction(cell):
@@ -119,40 +119,40 @@ def _no_fraction(cell):
 def _typed(text):
     """Return a label with its fraction in digits: 10¼ as 10 1/4."""
 
-    def figures(found):
-        return f"{found[1]} " * bool(found[1]) + normalize("NFKD", found[2]).replace("\u2044", "/")
+    def figures(match):
+        return f"{match[1]} " * bool(match[1]) + normalize("NFKD", match[2]).replace("\u2044", "/")
 
     return _VULGAR.sub(figures, text.strip())
 
 
 def _parts_by_shape(name, in_parts, rows, log):
     """Return 16, or any value if no part matters; raise InputError if eighths are as likely."""
-    parts = {int(one[3]): row for one, row in zip(in_parts, rows, strict=True) if one}
-    first = next(row for one, row in zip(in_parts, rows, strict=True) if one)
+    parts = {int(parts[3]): row for parts, row in zip(in_parts, rows, strict=True) if parts}
+    first = next(row for parts, row in zip(in_parts, rows, strict=True) if parts)
     if max(parts) == 0:
         return _SIXTEENTHS
     if max(parts) < _EIGHTHS:
-        found = next(one[0] for one in in_parts if one and int(one[3]))
+        example = next(in_part[0] for in_part in in_parts if in_part and int(in_part[3]))
         text = message(
             "lint_parts_of_inch",
             "found {found}, and no part of an inch over 7; expected a heading that says ft-in-8 or "
             "ft-in-16",
-            found=found,
+            found=example,
         )
         raise InputError(Problem(name, text, first))
     text = message(
         "lint_by_sixteenths",
         "heights such as {found} are taken as feet, inches and sixteenths: the heading does not "
         "say so",
-        found=next(one[0] for one in in_parts if one and int(one[3]) >= _EIGHTHS),
+        found=next(in_part[0] for in_part in in_parts if in_part and int(in_part[3]) >= _EIGHTHS),
     )
     log.warning(name, text, first)
     return _SIXTEENTHS
 
 
 def _read_parts(cell, unit):
-    found = _PARTS.fullmatch(cell.strip()) if isinstance(cell, str) else None
-    feet, inches, parts = map(int, found.groups()) if found else (0, INCHES_PER_FOOT, 0)
+    match = _PARTS.fullmatch(cell.strip()) if isinstance(cell, str) else None
+    feet, inches, parts = map(int, match.groups()) if match else (0, INCHES_PER_FOOT, 0)
     if inches >= INCHES_PER_FOOT or parts >= unit:
         text = message(
             "lint_no_parts_of_inch",

@@ -160,10 +160,10 @@ def heading_of(cell):
 
 def _is_rate(text):
     """Whether a heading is of volume per height (L/cm); h/cm and ft/in are not."""
-    found = _RATE.search(plain_text(text))
-    if found is None:
+    match = _RATE.search(plain_text(text))
+    if match is None:
         return False
-    over = found[1]
+    over = match[1]
     is_height = _HEIGHT.fullmatch(over) or _ULLAGE.fullmatch(over) or _SYMBOL.fullmatch(over)
     return not (is_height or size_of(over, LENGTH) is not None)
 
@@ -175,10 +175,10 @@ def is_unit(cell):
 
 def parts_of_inch(text):
     """Return 8 or 16 if a heading of feet and inches contains eighths or sixteenths, else None."""
-    found = _OF_INCH.search(plain_text(text)) if _any(_FEET, _words(text)) else None
-    if found is None:
+    match = _OF_INCH.search(plain_text(text)) if _any(_FEET, _words(text)) else None
+    if match is None:
         return None
-    return int(found[1]) if found[1] else 8 if found[2] else 16
+    return int(match[1]) if match[1] else 8 if match[2] else 16
 
 
 def announces_parts(cell):

@@ -170,7 +170,7 @@ def _in_order(teller, step, tolerance):
             continue
         partner = _partner(k, stray, expected, height, tolerance)
         twin = _twin(height[k], chain, teller.height, tolerance)
-        found = teller.shown(height[k])
+        shown = teller.shown(height[k])
         if partner is not None:
             done.add(partner)
             teller.problem(k, _swapped(teller, height, k, k, partner))
@@ -178,7 +178,7 @@ def _in_order(teller, step, tolerance):
             keep[k] = False
             _tell_twin(teller, k, twin)
         elif expected[k] is not None:
-            teller.problem(k, _rather(found, teller.shown(expected[k])))
+            teller.problem(k, _rather(shown, teller.shown(expected[k])))
             height[k] = expected[k]
         else:
             _tell_astray(teller, k, height)
@@ -236,49 +236,49 @@ def _twin(value, chain, height, tolerance):
 
 def _partner(k, stray, expected, height, tolerance):
     """Return the misplaced row with which this row is swapped, or None."""
-    for other in stray:
-        if other > k and expected[k] is not None and expected[other] is not None:
-            here = abs(expected[k] - height[other]) <= tolerance
-            there = abs(expected[other] - height[k]) <= tolerance
-            if here and there:
-                return other
+    for candidate in stray:
+        if candidate > k and expected[k] is not None and expected[candidate] is not None:
+            here = abs(expected[k] - height[candidate]) <= tolerance
+            is_expected = abs(expected[candidate] - height[k]) <= tolerance
+            if here and is_expected:
+                return candidate
     return None
 
 
 def _tell_twin(teller, k, twin):
     first, second = teller.entries[twin].volume, teller.entries[k].volume
-    found = message(
+    text = message(
         "lint_height_twice",
         "height {height} is also in row {row}",
         height=teller.shown(teller.height[k]),
         row=teller.row(twin),
     )
     if first.value == second.value:
-        teller.problem(k, message("lint_row_twice", "{found}: the row is given twice", found=found))
+        teller.problem(k, message("lint_row_twice", "{found}: the row is given twice", found=text))
         return
     expected = message(
         "lint_two_volumes",
         "{found}, with volume {there}, here {here}",
-        found=found,
+        found=text,
         there=first.text,
         here=second.text or message("lint_none", "none"),
     )
     teller.problem(k, expected)
 
 
-def _rather(found, expected):
+def _rather(text, expected):
     return message(
-        "lint_rather", "found {found}; expected {expected}", found=found, expected=expected
+        "lint_rather", "found {found}; expected {expected}", found=text, expected=expected
     )
 
 
-def _swapped(teller, height, k, one, other):
+def _swapped(teller, height, k, first_row, second_row):
     return message(
         "lint_rows_swapped",
         "found {found}; rows {row} and {other_row} are swapped",
         found=teller.shown(height[k]),
-        row=teller.row(one),
-        other_row=teller.row(other),
+        row=teller.row(first_row),
+        other_row=teller.row(second_row),
     )
 
 
@@ -333,7 +333,7 @@ def _tell_gaps(teller, height, tolerance):
             continue
         missing = round(steps[k] / largest) - 1
         fits = missing > 0 and abs(steps[k] - (missing + 1) * largest) <= 2 * tolerance
-        found = message(
+        order = message(
             "lint_follows",
             "{after} follows {before}",
             after=teller.shown(height[k + 1]),
@@ -355,7 +355,7 @@ def _tell_gaps(teller, height, tolerance):
                 "lint_a_step", "a step of {step}, as in the other rows", step=f"{largest:.9g}"
             )
         text = message(
-            "lint_gap", "found that {found}; expected {expected}", found=found, expected=expected
+            "lint_gap", "found that {found}; expected {expected}", found=order, expected=expected
         )
         teller.problem(k + 1, text)
 

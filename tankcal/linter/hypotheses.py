@@ -247,7 +247,7 @@ def _side(all_rows, part, between, spare):
 
     Only curves that do not fall there, with `spare` more rows than parameters.
     """
-    found, x = [], all_rows.basis[part]
+    curves, x = [], all_rows.basis[part]
     for degree in (1, 2, 3):
         if len(x) > degree + spare:
             powers = np.arange(degree + 1)
@@ -255,8 +255,8 @@ def _side(all_rows, part, between, spare):
             curve = Curve(basis, values, all_rows.weight[part], all_rows.noise)
             values, allowed = curve.at(between[:, None] ** powers)
             if values[-1] - values[0] >= -(allowed[0] + allowed[-1]):
-                found.append((curve, values, allowed))
-    return found
+                curves.append((curve, values, allowed))
+    return curves
 
 
 def _pairs(curve, members):

@@ -98,7 +98,7 @@ def _kinds(pairs):
     """Indices of the pairs of each kind: equal units and equal position after a height."""
     kinds = {}
     for number, pair in enumerate(pairs):
-        place = sum(other.height == pair.height for other in pairs[:number])
+        place = sum(earlier.height == pair.height for earlier in pairs[:number])
         units = (pair.height_heading.named, pair.volume_heading.named)
         kinds.setdefault((place, units), []).append(number)
     return list(kinds.values())
@@ -106,16 +106,16 @@ def _kinds(pairs):
 
 def _table(grid, blocks, numbers, log):
     cells = [_cells(grid, block, [block.pairs[k] for k in numbers], log) for block in blocks]
-    by_column = [one for page in cells for column in page for one in column]
+    by_column = [item for page in cells for column in page for item in column]
     orders = [by_column]
     if len(numbers) > 1 or blocks[0].wide is not None:
-        orders.append([one for page in cells for row in _by_row(page) for one in row])
-    style = style_of([[one[3] for one in by_column], [one[4] for one in by_column]])
+        orders.append([item for page in cells for row in _by_row(page) for item in row])
+    style = style_of([[item[3] for item in by_column], [item[4] for item in by_column]])
     first = blocks[0].pairs[numbers[0]]
-    heights, rows = [one[3] for one in by_column], [one[0] for one in by_column]
+    heights, rows = [item[3] for item in by_column], [item[0] for item in by_column]
     in_feet = feet_reader(grid.name, heights, first.height_heading, rows, log)
     in_fractions = None if in_feet else fraction_reader(heights, first.height_heading, style)
-    orders = [[_entry(one, style, in_feet or in_fractions) for one in order] for order in orders]
+    orders = [[_entry(item, style, in_feet or in_fractions) for item in order] for order in orders]
     entries = min(orders, key=_turns)
     height_m = 1.0 if in_feet else _height_unit(grid.name, first, in_fractions, entries, log)
     complaints = [problem for block in blocks for problem in block.complaints]
@@ -146,13 +146,13 @@ def _height_unit(name, pair, in_fractions, entries, log):
     if named.is_named:
         # 10 1/4 below "1/8 in" is in inches: the factor is the graduation
         return None if named.size is None else named.size / min(named.factor, 1.0)
-    found = next(one for one in entries if "/" in one.height.text)
+    example = next(entry for entry in entries if "/" in entry.height.text)
     text = message(
         "lint_by_inches",
         "heights such as {found} are taken as inches: the heading names no unit",
-        found=found.height.text,
+        found=example.height.text,
     )
-    log.warning(name, text, found.row, found.height_column)
+    log.warning(name, text, example.row, example.height_column)
     return INCH_M
 
 
@@ -185,7 +185,7 @@ def _complaints_of_volumes(pair, entries):
 def _complaints_of_factor(heading, readings):
     """Return (text, column) if a factor may be the rounding of the numbers: 10 L, 1/8 in."""
     factor = heading.named.factor
-    values = [one.value for one in readings if one.value]
+    values = [reading.value for reading in readings if reading.value]
     if factor == 1 or heading.named.is_multiplied or not values:
         return
     multiples = values if factor < 1 else [value / factor for value in values]
@@ -205,7 +205,7 @@ def _complaints_of_factor(heading, readings):
 
 def _example(readings, are_whole, factor):
     """Text of a number that is not a multiple of the graduation, or of the last multiple."""
-    texts = [one.text for one in readings if one.value]
+    texts = [reading.text for reading in readings if reading.value]
     return texts[-1] if factor > 1 else texts[are_whole.index(False)]
 
 
@@ -233,13 +233,13 @@ def _cells(grid, block, pairs, log):
             volume = cells[pair.volume] if pair.volume < len(cells) else None
             if not has_digit(height) and (not has_digit(volume) or _is_total(cells, pair)):
                 continue  # a note or a total between the rows
-            told = Reading(None) if is_split else None  # told already
+            unreadable = Reading(None) if is_split else None  # told already
             beside = {
-                what: cells[place] if place < len(cells) else None
-                for what, place in pair.beside.items()
+                kind: cells[place] if place < len(cells) else None
+                for kind, place in pair.beside.items()
             }
             column.append(
-                (row, names[pair.height], names[pair.volume], height, told or volume, beside)
+                (row, names[pair.height], names[pair.volume], height, unreadable or volume, beside)
             )
     return columns
 
@@ -292,7 +292,7 @@ def _entry(cells, style, read_height):
     row, height_name, volume_name, height, volume, beside = cells
     volume = volume if isinstance(volume, Reading) else read_number(volume, style)
     height = read_height(height) if read_height else read_number(height, style)
-    beside = {what: read_number(cell, style) for what, cell in beside.items()}
+    beside = {kind: read_number(cell, style) for kind, cell in beside.items()}
     return Entry(row, height_name, volume_name, height, volume, **beside)
 
 

@@ -107,11 +107,11 @@ class Finding:
     @property
     def text(self):
         """The complete line as a Message."""
-        said = self.problem.expected
+        expected = self.problem.expected
         if self.severity == "error":
-            text = message("is_error", "error: {text}", text=said)
+            text = message("is_error", "error: {text}", text=expected)
         else:
-            text = message("is_warning", "warning: {text}", text=said)
+            text = message("is_warning", "warning: {text}", text=expected)
         return replace(self.problem, expected=text).text
 
 
@@ -144,8 +144,13 @@ class Report:
 
     def _repr_html_(self) -> str:
         rows = [
-            [one.severity, one.problem.row, one.problem.column, str(one.problem.expected)]
-            for one in self.findings
+            [
+                finding.severity,
+                finding.problem.row,
+                finding.problem.column,
+                str(finding.problem.expected),
+            ]
+            for finding in self.findings
         ]
         caption = "; ".join([*self.summaries, str(self)])
         return table_html(caption, ["", "row", "column", "finding"], rows)
@@ -254,18 +259,18 @@ def checked(
     ]
     if complaints:
         raise InputError(list(dict.fromkeys(complaints)))
-    summaries, areas, found = [], None, []
+    summaries, areas, checked_tables = [], None, []
     for table in tables:
         if len(table.entries) >= _PART_OF_LARGEST * longest:
-            has_several = sum(other.name == table.name for other in tables) > 1
-            one, summary, areas = _check(table, nominal, log, even_steps, has_several)
+            has_several = sum(other_table.name == table.name for other_table in tables) > 1
+            checked_table, summary, areas = _check(table, nominal, log, even_steps, has_several)
             summaries.append(summary)
-            found.append(one)
+            checked_tables.append(checked_table)
     for table in tables:
         if len(table.entries) <= MOST_PARTS < longest:
             check_parts(table, areas, log)
     report = Report(_findings(log), tuple(line for line in summaries if line))
-    return Checked(report, tuple(found))
+    return Checked(report, tuple(checked_tables))
 
 
 def _declared(table, declared):
@@ -295,17 +300,19 @@ def _tables(file, grids, sheet, log, choose=None):
             )
             raise InputError(Problem(file, expected))
         grids = [grid for grid in grids if grid.sheet == sheet]
-    found = []
+    sheets_read = []
     for grid in grids:
-        told = Log()
-        tables = tables_of(grid, told)
+        sheet_log = Log()
+        tables = tables_of(grid, sheet_log)
         size = max((len(table.entries) for table in tables), default=0)
-        found.append((size, tables, told))
-    size, tables, told = max(found, key=lambda one: one[0], default=(0, (), Log()))
+        sheets_read.append((size, tables, sheet_log))
+    size, tables, sheet_log = max(
+        sheets_read, key=lambda candidate: candidate[0], default=(0, (), Log())
+    )
     if size and choose is not None:
-        _, tables, told = found[choose([one[1] for one in found])]
+        _, tables, sheet_log = sheets_read[choose([candidate[1] for candidate in sheets_read])]
     if size == 0:
-        refusals = [problem for *_, one in found for problem in one.problems]
+        refusals = [problem for *_, candidate in sheets_read for problem in candidate.problems]
         if refusals:
             raise InputError(refusals)
         expected = message(
@@ -314,8 +321,8 @@ def _tables(file, grids, sheet, log, choose=None):
             "such as height_m, volume_m3",
         )
         raise InputError(Problem(file, expected))
-    log.problems += told.problems
-    log.warnings += told.warnings
+    log.problems += sheet_log.problems
+    log.warnings += sheet_log.warnings
     return tables
 
 
@@ -361,6 +368,6 @@ def _areas(volumes, units):
 
 
 def _findings(log):
-    found = [Finding("error", problem) for problem in log.problems]
-    found += [Finding("warning", problem) for problem in log.warnings]
-    return tuple(sorted(dict.fromkeys(found), key=lambda one: one.problem.row or 0))
+    findings = [Finding("error", problem) for problem in log.problems]
+    findings += [Finding("warning", problem) for problem in log.warnings]
+    return tuple(sorted(dict.fromkeys(findings), key=lambda finding: finding.problem.row or 0))

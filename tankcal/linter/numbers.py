@@ -92,8 +92,8 @@ def read_number(cell, style):
     return _read_text(f"{cell:.15g}" if isinstance(cell, float) else str(cell), PLAIN, False)
 
 
-def _no_number(found):
-    return message("lint_no_number", "found {found}; expected a number", found=shown(found))
+def _no_number(text):
+    return message("lint_no_number", "found {found}; expected a number", found=shown(text))
 
 
 @lru_cache(maxsize=50_000)  # cached because style_of reads most cells several times
@@ -171,9 +171,9 @@ def style_of(columns):
 
     best, least = PLAIN, float("inf")
     for style in possible:
-        found = badness(style, least)
-        if found < least:
-            best, least = style, found
+        score = badness(style, least)
+        if score < least:
+            best, least = style, score
         if least == 0:
             break
     return best

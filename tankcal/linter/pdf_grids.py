@@ -164,12 +164,14 @@ def _placed(words, columns):
 def _joined(pages):
     """Merge pages with the same heading, and pages that have only its first columns."""
     headings = [page[0][1] for page in pages]
-    found = {}
+    merged = {}
     for (row, heading), *rows in pages:
-        wider = [one for one in headings if one[: len(heading)] == heading]
+        wider = [
+            known_heading for known_heading in headings if known_heading[: len(heading)] == heading
+        ]
         widest = max(wider, key=len)
-        found.setdefault(widest, []).extend([(row, widest), *rows])
-    return list(found.values())
+        merged.setdefault(widest, []).extend([(row, widest), *rows])
+    return list(merged.values())
 
 
 def _headed(rows):

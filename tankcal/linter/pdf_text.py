@@ -26,14 +26,14 @@ def pages_of(path, log):
 
     None after reporting to `log` why there is none.
     """
-    kind, said = _asked_child(path)
-    if kind == PAGES and any(page.strip() for page in said):
-        return tuple(said)
-    log.problem(path.name, _refusal(kind, said))
+    kind, answer = _asked_child(path)
+    if kind == PAGES and any(page.strip() for page in answer):
+        return tuple(answer)
+    log.problem(path.name, _refusal(kind, answer))
     return None
 
 
-def _refusal(kind, said):
+def _refusal(kind, answer):
     if kind == PAGES:
         return message(
             "lint_scanned_pdf",
@@ -46,7 +46,7 @@ def _refusal(kind, said):
         return message(
             "lint_long_pdf",
             "{count} pages; expected at most {most}: only those of the table",
-            count=said,
+            count=answer,
             most=MOST_PAGES,
         )
     if kind == LONG_TEXT:
@@ -71,10 +71,10 @@ def _asked_child(path):
             timeout=MOST_SECONDS,
             check=False,
         )
-        kind, said = json.loads(done.stdout)
+        kind, answer = json.loads(done.stdout)
     except (subprocess.TimeoutExpired, OSError, ValueError):
         return DAMAGED, None
-    return kind, said
+    return kind, answer
 
 
 def main(request):

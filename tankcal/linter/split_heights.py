@@ -29,10 +29,10 @@ _PARTS = re.compile(r"(?:1/)?(8|16|32|64) ?(?:ths?|nds?|avos?)?|(eighths?|oitavo
 
 def parts_heading(cell):
     """Return the `Heading` of parts of an inch after a column of inches; None for other columns."""
-    found = _PARTS.fullmatch(plain_text(str(cell)).strip(" ()[].")) if not is_blank(cell) else None
-    if found is None:
+    match = _PARTS.fullmatch(plain_text(str(cell)).strip(" ()[].")) if not is_blank(cell) else None
+    if match is None:
         return None
-    parts = int(found[1]) if found[1] else 8 if found[2] else 16 if found[3] else 1
+    parts = int(match[1]) if match[1] else 8 if match[2] else 16 if match[3] else 1
     return Heading(str(cell).strip(), "height", Unit(INCH_M / parts))
 
 
@@ -56,7 +56,7 @@ def with_joined_heights(name, rows, places, headings):
     body = [(row, cells) for row, cells in rows if _has_height(cells, places)]
     columns = [_values([cells[k] if k < len(cells) else None for _, cells in body]) for k in places]
     columns[0] = _filled_down(columns[0])
-    values = np.array([[np.nan if one is None else float(one) for one in c] for c in columns])
+    values = np.array([[np.nan if cell is None else float(cell) for cell in c] for c in columns])
     if len(body) < 2 or _are_one_height(values[:2], sizes[:2]):
         return rows, None
     ratios = [round(a / b) for a, b in pairwise(sizes)]

@@ -46,14 +46,14 @@ def units_of(table, volumes, log):
     """Return the `Units` from the headings, or those that give a tank of usual proportions."""
     pairs = _possible(table)
     if table.volume_choices:  # volumes do not distinguish gallons
-        pairs = [one for one in pairs if one.volume_m3 == table.volume_choices[0]]
-        told = message(
+        pairs = [pair for pair in pairs if pair.volume_m3 == table.volume_choices[0]]
+        note = message(
             "lint_gallons",
             "gallons of no country: taken as US gallons (3.7854 L); imperial gallons (4.54609 L) "
             "give volumes 20 % larger; expected US gal or imp gal in the heading",
         )
-        log.warning(table.name, told)
-    units = min(pairs, key=lambda one: _oddity(volumes, one))
+        log.warning(table.name, note)
+    units = min(pairs, key=lambda pair: _oddity(volumes, pair))
     if len(pairs) > 1:
         text = message(
             "lint_no_units",
@@ -67,7 +67,7 @@ def units_of(table, volumes, log):
 
 def likely_units(table, volumes):
     """Return the `Units` permitted by the headings that give a tank of usual proportions."""
-    return [one for one in _possible(table) if _is_usual(volumes, one)]
+    return [units for units in _possible(table) if _is_usual(volumes, units)]
 
 
 def _possible(table):

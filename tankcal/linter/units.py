@@ -265,10 +265,10 @@ def names_only_units(text):
     tokens = tokens_of(text)
     words = [token for token in tokens if token[0].isalpha() or token in ("%", "‰", "°")]
     is_unit = [
-        any(size_of(word, one) is not None for one in (LENGTH, VOLUME))
+        any(size_of(word, dimension) is not None for dimension in (LENGTH, VOLUME))
         or _kind(word) is not None
         or word in _TIMES
-        or any(one.fullmatch(word) for one in (_US, _IMPERIAL, _DRY))
+        or any(dimension.fullmatch(word) for dimension in (_US, _IMPERIAL, _DRY))
         for word in words
     ]
     return all(is_unit) and any(word not in _TIMES for word in words)
@@ -362,11 +362,11 @@ def _is_alone(tokens, k):
 def _foreign_ratio(tokens, places):
     """Text of a ratio of units such as kg/L; "" if there is none."""
     for k in places:
-        for other, slash in ((k - 2, k - 1), (k + 2, k + 1)):
-            if 0 <= other < len(tokens) and 0 <= slash < len(tokens) and tokens[slash] == "/":
-                kind = _kind(tokens[other])
-                if kind is not None and not _BY_POSITION.fullmatch(tokens[other]):
-                    return "".join(tokens[min(k, other) : max(k, other) + 1])
+        for neighbour, slash in ((k - 2, k - 1), (k + 2, k + 1)):
+            if 0 <= neighbour < len(tokens) and 0 <= slash < len(tokens) and tokens[slash] == "/":
+                kind = _kind(tokens[neighbour])
+                if kind is not None and not _BY_POSITION.fullmatch(tokens[neighbour]):
+                    return "".join(tokens[min(k, neighbour) : max(k, neighbour) + 1])
     return ""
 
 
@@ -387,7 +387,7 @@ def number_of(token):
 
 def _factor(tokens, places):
     """(factor, whether it has a multiplication sign, text of an unclear number or "")."""
-    found, is_multiplied = {}, False
+    numbers, is_multiplied = {}, False
     for k, token in enumerate(tokens):
         value = number_of(token)
         if value is None:
@@ -396,7 +396,7 @@ def _factor(tokens, places):
         ahead = k + 1
         while ahead < len(tokens) and (
             tokens[ahead] in _TIMES | _BETWEEN
-            or any(one.fullmatch(tokens[ahead]) for one in (_US, _IMPERIAL))
+            or any(pattern.fullmatch(tokens[ahead]) for pattern in (_US, _IMPERIAL))
         ):
             ahead += 1
         signs = {before, *tokens[k + 1 : ahead]} & _TIMES
@@ -421,8 +421,8 @@ def _factor(tokens, places):
             is_free = False
         if is_free or not _is_usual_factor(value):
             return 1.0, False, token
-        found[k], is_multiplied = value, is_multiplied or bool(signs)
-    return float(prod(found.values())), is_multiplied, ""
+        numbers[k], is_multiplied = value, is_multiplied or bool(signs)
+    return float(prod(numbers.values())), is_multiplied, ""
 
 
 _ROLE_WORD = re.compile(
@@ -438,7 +438,7 @@ def _is_usual_factor(value):
 def _countries(tokens, names):
     """(sizes of gallons, complaint) from the country in the tokens."""
     is_us, is_imperial, is_dry = (
-        any(one.fullmatch(token) for token in tokens) for one in (_US, _IMPERIAL, _DRY)
+        any(pattern.fullmatch(token) for token in tokens) for pattern in (_US, _IMPERIAL, _DRY)
     )
     gallons = [name for name in names if _GALLON.fullmatch(name)]
     is_odd = is_imperial and any(_BARREL.fullmatch(name) for name in names)

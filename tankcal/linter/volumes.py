@@ -66,12 +66,12 @@ def _one_digit(text):
 
 def _transposed(text):
     places = [k for k, char in enumerate(text) if char.isdigit()]
-    found = []
+    numbers = []
     for a, b in pairwise(places):
         chars = list(text)
         chars[a], chars[b] = chars[b], chars[a]
-        found.append("".join(chars))
-    return found
+        numbers.append("".join(chars))
+    return numbers
 
 
 def _moved_mark(text, decimals):
@@ -148,23 +148,23 @@ def volumes_of(table, series, log):
     decimals = _check_rounding(table, entries, log)
     quantum = max(10.0**-decimals, _FINEST * float(np.abs(volume).max()), 1e-300)
     rounding = series.rounding[good] / series.step
-    found = examine(height / series.step, volume / quantum, rounding)
-    teller = _Teller(table, entries, volume, quantum, decimals, found.joints, log)
-    for fault in found.faults:
+    examined = examine(height / series.step, volume / quantum, rounding)
+    teller = _Teller(table, entries, volume, quantum, decimals, examined.joints, log)
+    for fault in examined.faults:
         teller.tell(fault)
-    _check_falls(teller, found.volume * quantum)
-    if not found.complete:
+    _check_falls(teller, examined.volume * quantum)
+    if not examined.complete:
         log.warning(
             table.name,
             message("lint_rough", "the volumes are too rough for every row to be examined"),
         )
-    joints = tuple(float(height[row]) for row in found.joints)
+    joints = tuple(float(height[row]) for row in examined.joints)
     return Volumes(height, volume, decimals, joints)
 
 
 def _left_out(table, entries, log):
     """Rows of long, intended blanks, such as a critical zone of a roof that is not for use."""
-    found = set()
+    left_out = set()
     for is_blank, run in groupby(
         range(len(entries)), lambda k: entries[k].volume.complaint == BLANK
     ):
@@ -177,8 +177,8 @@ def _left_out(table, entries, log):
                 last_row=last.row,
             )
             log.warning(table.name, text, first.row, first.volume_column)
-            found.update(rows)
-    return found
+            left_out.update(rows)
+    return left_out
 
 
 def _is_readable(table, entry, log):
@@ -197,7 +197,7 @@ def _is_readable(table, entry, log):
 
 def _check_marks(table, entries, log):
     """Report thousands separators, and texts that look like numbers in a workbook."""
-    for having, what in (
+    for having, description in (
         (
             [e for e in entries if e.volume.marks],
             message("lint_thousands_mark", "a thousands mark"),
@@ -211,7 +211,7 @@ def _check_marks(table, entries, log):
             text = message(
                 "lint_written_in_all",
                 "{what} in {count} volumes; expected numbers that any program can read",
-                what=what,
+                what=description,
                 count=len(having),
             )
             log.warning(table.name, text, having[0].row, having[0].volume_column)
@@ -220,7 +220,7 @@ def _check_marks(table, entries, log):
                 text = message(
                     "lint_written_so",
                     "found {what}; expected {expected}, as the other rows are written",
-                    what=what,
+                    what=description,
                     expected=entry.volume.text,
                 )
                 log.problem(table.name, text, entry.row, entry.volume_column)

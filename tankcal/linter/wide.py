@@ -89,9 +89,11 @@ def wide_heading(rows, index, above):
     volume = _volume_heading(cells, above)
     titles = [line[0] for line in (cells, *above[::-1]) if line and _is_short(line[0])]
     roles = [heading_of(title) for title in titles]
-    role = next((one.role for one in roles if one.role in ("height", "ullage")), "height")
+    role = next(
+        (heading.role for heading in roles if heading.role in ("height", "ullage")), "height"
+    )
     text = cells[0].strip() if isinstance(cells[0], str) else ""
-    text = text or next((one.text for one in roles if one.text), "")
+    text = text or next((heading.text for heading in roles if heading.text), "")
     texts = tuple(str(cell).strip() for cell in cells[1 : 1 + len(labels)])
     values = tuple(value for value, _ in labels)
     unit = Unit(row_m) if row_m is not None else Unit()
@@ -110,7 +112,7 @@ def _volume_heading(cells, above):
     for line in (cells, *above[::-1]):
         for position, cell in enumerate(line):
             heading = heading_of(cell)
-            is_title = position == 0 and sum(not is_blank(one) for one in line) == 1
+            is_title = position == 0 and sum(not is_blank(cell) for cell in line) == 1
             if heading.role == "volume" and not is_title:
                 return heading
     return Heading("", "volume", title_unit(above))
@@ -166,19 +168,23 @@ def _units(cells, above, of_labels):
 
     A first cell such as cm / mm states both.
     """
-    own = []
+    own_units = []
     for line in (cells, *above[::-1]):
         text = line[0] if line and _is_short(line[0]) else ""
         tokens = without_prepositions(tokens_of(text))
-        own += [size for size in (size_of(token, LENGTH) for token in tokens) if size is not None]
-        if own:
+        own_units += [
+            size for size in (size_of(token, LENGTH) for token in tokens) if size is not None
+        ]
+        if own_units:
             break
-    other = [of_labels] if of_labels is not None else own[1:]
-    if not other:
+    label_units = [of_labels] if of_labels is not None else own_units[1:]
+    if not label_units:
         texts = [cell for line in above for cell in line[1:] if isinstance(cell, str)]
         tokens = [token for text in texts for token in without_prepositions(tokens_of(text))]
-        other = [size for size in (size_of(token, LENGTH) for token in tokens) if size is not None]
-    return (own[0] if own else None), (other[0] if other else None)
+        label_units = [
+            size for size in (size_of(token, LENGTH) for token in tokens) if size is not None
+        ]
+    return (own_units[0] if own_units else None), (label_units[0] if label_units else None)
 
 
 def wide_cells(name, wide, rows, log):
@@ -258,7 +264,7 @@ def _ratio(wide, bases):
         ratio = wide.label_m / wide.row_m
         fits = (abs(ratio / one - 1) <= _SAME for one in (row_by_row, by_column))
         return ratio if any(fits) else None
-    known = (one for one in _RATIOS if abs(one / row_by_row - 1) <= _SAME)
+    known = (ratio for ratio in _RATIOS if abs(ratio / row_by_row - 1) <= _SAME)
     return next(known, None)
 
 
@@ -267,10 +273,12 @@ def refused_columns(name, block_rows, pairs, heading_row, heading_cells):
 
     None if there are none.
     """
-    taken = {place for pair in pairs for place in (pair.height, pair.volume, *pair.beside.values())}
+    used_columns = {
+        place for pair in pairs for place in (pair.height, pair.volume, *pair.beside.values())
+    }
     width = max((len(cells) for _, cells in block_rows), default=0)
     unnamed = []
-    for place in set(range(width)) - taken:
+    for place in set(range(width)) - used_columns:
         title = heading_cells[place] if place < len(heading_cells) else None
         if has_letter(title):
             continue
