@@ -196,6 +196,15 @@ def polyline_error(height, volume, at, written, rows):
 
     Table and polyline are linear between all their heights, so the largest error is at one of
     these. The polyline is constant beyond its ends.
+
+    Parameters
+    ----------
+    height, volume : ndarray, shape (rows,)
+        The table.
+    at, written : ndarray, shape (rows,)
+        Heights and volumes as written.
+    rows : ndarray of int
+        Rows of the polyline.
     """
     heights = np.union1d(height, at[rows])
     exact = np.interp(heights, height, volume)

@@ -63,8 +63,14 @@ def increments_of(height_m, increment):
 def marks_of(height_m, volume_m3, profile, reference_m=None, must=()):
     """Return the `Marks` of a table in a profile.
 
-    reference_m: reference height of ullages; must: rows that take precedence over others of equal
-    level.
+    Parameters
+    ----------
+    height_m, volume_m3 : (rows,) ndarray
+    profile : Profile
+    reference_m : float, optional
+        Reference height of ullages.
+    must : sequence of int, optional
+        Rows that take precedence over other rows of equal level.
     """
     quantum, volume_quantum = profile.level_quantum_m, profile.volume_quantum_m3
     is_ullage = profile.leading == "ullage"

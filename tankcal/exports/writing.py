@@ -80,7 +80,15 @@ def written(number, decimals, mark=".", thousands=""):
 def file_text(body, profile, facts, values):
     """Return the text of the file: header, provenance, headings, rows.
 
-    facts: lines of provenance; values: {placeholder: text} of the header.
+    Parameters
+    ----------
+    body : list of list of str
+        Rows of the file.
+    profile : Profile
+    facts : sequence of str
+        Lines of provenance.
+    values : dict
+        {placeholder: text} of the header.
     """
     head = [line.format(**values) for line in profile.header]
     if profile.provenance:

@@ -272,6 +272,7 @@ def _with_uncertainty(pairs, cells):
 
 
 def trimmed(cells):
+    """Return the cells without trailing blank cells."""
     cells = list(cells)
     while cells and is_blank(cells[-1]):
         cells.pop()

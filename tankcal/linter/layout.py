@@ -233,7 +233,7 @@ def _cells(grid, block, pairs, log):
             volume = cells[pair.volume] if pair.volume < len(cells) else None
             if not has_digit(height) and (not has_digit(volume) or _is_total(cells, pair)):
                 continue  # a note or a total between the rows
-            unreadable = Reading(None) if is_split else None  # told already
+            unreadable = Reading(None) if is_split else None  # reported already
             beside = {
                 kind: cells[place] if place < len(cells) else None
                 for kind, place in pair.beside.items()

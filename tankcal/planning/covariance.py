@@ -53,6 +53,7 @@ class PredictedCovariance:
     @cached_property
     def _across(self):
         trace = np.einsum("nii->", self.adjusted.point_covariances_m2[self.points])
+        # The trace of C determines s2 of A = C D - D (D'C D + s2 I) / 2.
         return s_transform_factors(self._basis, self._in_frame(self._basis), trace)
 
     def among(self, column):
@@ -65,7 +66,7 @@ class PredictedCovariance:
 
     def written_out(self):
         """Dense covariance (3n, 3n); for few points only."""
-        cross = self._basis @ self._across.T
+        cross = self._basis @ self._across.T  # D A'
         return self.adjusted.covariance_m2(self.points) - cross - cross.T
 
     def of_each_point(self):

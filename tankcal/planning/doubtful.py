@@ -83,7 +83,7 @@ def single_readings(plan, observations):
     count = np.array([times.get(ids[0], 1) for ids in trace.ids])
     turn = np.zeros(len(count))
     if trace.table == "directions":
-        turn = (1.0 - 1.0 / count) * _share_of_set(observations)
+        turn = (1.0 - 1.0 / count) * _share_of_set(observations)  # (1 - 1/n) q
     return SingleReadings(np.arange(len(count)), 1.0 / count, count, turn)
 
 
@@ -183,6 +183,7 @@ def reliability(plan, predicted, covariance, by_points_m2):
     """
     adjusted = predicted.adjusted
     problem, solution = adjusted.problem, adjusted.solution
+    # Q g' is common to all readings; j Q g' is the effect of a whitened unit error.
     pull = _pull(solution, problem.layout.points[covariance.points].ravel(), by_points_m2)
     groups = []
     for number, table in enumerate(problem.observations):
@@ -214,8 +215,10 @@ def _by_name(table, single, redundancy, effect):
     trace = table.trace.taken(single.of)
     names = np.array(trace.group, dtype=object)
     controlled = redundancy > UNCONTROLLED
+    # delta0 / sqrt(r): smallest detectable blunder in standard deviations
     size = np.where(controlled, noncentrality() / np.sqrt(np.where(controlled, redundancy, 1)), 0)
     weight = table.using(np.ones(len(table))).weight[single.of] * single.root()
+    # The weight and the whitened effect of a single reading are sqrt(p) times those of the mean.
     effect = effect[single.of] * single.root()
     blunder, volume = size / weight, size * effect
     per_unit = np.where(controlled, -1.0, effect * weight)

@@ -93,9 +93,20 @@ def line_cut(start, end):
 
 
 def find_hidden(obstacle, place_m, xyz_m):
-    """Return a mask (n,).
+    """Find the points hidden by an obstacle.
 
-    Whether a Box or Pillar cuts the line from place_m (3,) to each point (n, 3).
+    Parameters
+    ----------
+    obstacle : Box or Pillar
+    place_m : ndarray, shape (3,)
+        Position of the observer.
+    xyz_m : ndarray, shape (n, 3)
+        Points.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        Whether the obstacle cuts the line from the position to each point.
     """
     along = xyz_m - place_m
     if isinstance(obstacle, Box):
@@ -106,12 +117,13 @@ def find_hidden(obstacle, place_m, xyz_m):
         first, last = _in_slabs(place_m, along, low, high)
         near, far = _in_round(place_m[:2] - obstacle.axis_m, along[:, :2], obstacle.radius_m)
         first, last = np.maximum(first, near), np.minimum(last, far)
+    # The line parameter is 0 at the observer and 1 at the point.
     return np.maximum(first, 0.0) < np.minimum(last, 1.0)
 
 
 def _in_slabs(place, along, low, high):
     """First and last line parameters (n,), (n,) within the slabs of three axes."""
-    still = along == 0
+    still = along == 0  # parallel to a slab: inside it everywhere or nowhere
     step = np.where(still, 1.0, along)
     to_low, to_high = (low - place) / step, (high - place) / step
     inside = (place > low) & (place < high)
@@ -122,6 +134,7 @@ def _in_slabs(place, along, low, high):
 
 def _in_round(place, along, radius):
     """First and last line parameters within a circle: |place + t along| < radius."""
+    # a t^2 + 2 b t + c < 0 between the roots; a vertical line (a = 0) is inside if c < 0
     a, b = np.einsum("ni,ni->n", along, along), along @ place
     c = place @ place - radius**2
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -52,10 +52,25 @@ def joints_of(courses):
 
 
 def row_heights_m(courses, levels, clearance_m):
-    """Heights of target rows above the bottom, m, and the index of the course of each row.
+    """Heights of target rows above the bottom, and the course of each row.
 
     Rows are at the Gauss levels of every course. Rows nearer to a weld than the clearance are moved
     to the clearance. A course too low for the clearance has one row in the middle.
+
+    Parameters
+    ----------
+    courses : sequence of Course
+    levels : int
+        Number of Gauss levels per course.
+    clearance_m : float
+        Smallest distance from a weld.
+
+    Returns
+    -------
+    heights : ndarray, shape (rows,)
+        m.
+    index : ndarray of int, shape (rows,)
+        Index of the course.
     """
     joints = joints_of(courses)
     heights, index = [], []
@@ -149,7 +164,22 @@ def ring_radius_m(ring, shell):
 
 
 def photographs_of(ring, number, shell, image_sd_mm, place):
-    """Return the Photographs of the `number`th [[photo_rings]]."""
+    """Return the Photographs of the `number`th [[photo_rings]].
+
+    Parameters
+    ----------
+    ring : Entry
+    number : int
+    shell : Shell
+    image_sd_mm : float
+        Default standard deviation of an image coordinate.
+    place : tuple
+        (file, row, column) of the ring, for messages.
+
+    Returns
+    -------
+    list of Photograph
+    """
     photographs = []
     sd = image_sd_mm if ring["s_um"] is None else ring["s_um"] / 1000
     height = _or(ring["aim_height_m"], (shell.high_m - shell.low_m) / 2)
@@ -183,23 +213,23 @@ def photographs_of(ring, number, shell, image_sd_mm, place):
     return photographs
 
 
-def setups_of(given, number, shell, place):
+def setups_of(entry, number, shell, place):
     """Return the set-ups of the `number`th [[setup_rings]]."""
     setups = []
-    stands = list(_stands(given, shell))
+    stands = list(_stands(entry, shell))
     names = [f"T{number}-{i + 1}" + (f"-{k + 1}" if k else "") for _, _, i, k in stands]
     for at, (_, xyz, _, level) in enumerate(stands):
         ring = [name for name, stand in zip(names, stands, strict=True) if stand[3] == level]
         setups.append(
             Instrumented(
                 name=names[at],
-                instrument=given["instrument"],
+                instrument=entry["instrument"],
                 xyz_m=xyz,
-                direction_sd_rad=_scaled(given["s_direction_arcsec"], ARCSEC),
-                zenith_sd_rad=_scaled(given["s_zenith_arcsec"], ARCSEC),
-                distance_sd_m=_scaled(given["s_mm"], 1e-3),
-                sets=int(_or(given["sets"], 1)),
-                sights=() if given["sights"] is False else _neighbours(ring, names[at]),
+                direction_sd_rad=_scaled(entry["s_direction_arcsec"], ARCSEC),
+                zenith_sd_rad=_scaled(entry["s_zenith_arcsec"], ARCSEC),
+                distance_sd_m=_scaled(entry["s_mm"], 1e-3),
+                sets=int(_or(entry["sets"], 1)),
+                sights=() if entry["sights"] is False else _neighbours(ring, names[at]),
                 place=place,
             )
         )
@@ -213,12 +243,23 @@ def _neighbours(ring, name):
 
 
 def tape_of(tape, shell):
-    """Return the Tie of one [[tapes]], the positions {name.
-
-    (3,)} of its ends, and their normal (3,).
+    """Return the Tie of one [[tapes]], the positions of its ends, and their normal.
 
     A vertical tape hangs beside the wall. Outside, a horizontal tape lies along a tangent; inside,
     it lies along a chord whose ends have the stated distance from the wall.
+
+    Parameters
+    ----------
+    tape : Entry
+    shell : Shell
+
+    Returns
+    -------
+    tie : Tie
+    ends : dict
+        {name: (3,) position} of the two ends.
+    normal : ndarray, shape (3,)
+        Horizontal unit vector from the wall to the observer.
     """
     azimuth, length = np.radians(tape["azimuth_deg"]), tape["length_m"]
     side = 1.0 if shell.outside else -1.0

@@ -256,6 +256,7 @@ def sections_of(tabled):
         x, y, _ = tabled.job.points.xyz_m[wall.accepted[members]].T
         away = np.column_stack([x - section.circle.x_m, y - section.circle.y_m])
         unit = away / np.linalg.norm(away, axis=1)[:, None]
+        # Circle fit, linearised: radial error = unit vector times centre shift + radius change.
         inverse = np.linalg.pinv(np.column_stack([unit, np.ones(len(unit))]))
         row = np.zeros((3, n))
         row[:, 3 * members], row[:, 3 * members + 1] = inverse * unit[:, 0], inverse * unit[:, 1]

@@ -102,10 +102,12 @@ def find_in_frame(setup, photo, xyz_m):
 
     setup is the job.CameraSetup of the photograph.
     """
+    # camera coordinates; the camera looks along -w
     u, v, w = photo.rotation @ (xyz_m - photo.xyz_m).T
     camera, half = setup.camera, setup.format_mm / 2
     ahead = w < -AHEAD_M
     ideal = -camera.values[0] * np.column_stack([u, v]) / np.where(ahead, w, -1.0)[:, None]
+    # Far outside the frame the distortion polynomial can fold points back into the frame.
     near = ahead & (np.abs(ideal) < ROOM * half).all(axis=1)
     image = np.full((len(xyz_m), 2), np.nan)
     image[near] = distort_image_points(ideal[near], camera.values, camera.form)
@@ -113,9 +115,21 @@ def find_in_frame(setup, photo, xyz_m):
 
 
 def find_in_sight(plan, place_m, xyz_m, normals):
-    """Mask (n,): points (n, 3) visible from place_m (3,) within the largest angle of incidence.
+    """Find the points visible from a position within the largest angle of incidence.
 
-    normals (n, 3) are those of the wall, or of marks visible from one side; nan for other points.
+    Parameters
+    ----------
+    plan : Plan
+    place_m : ndarray, shape (3,)
+        Position of the observer.
+    xyz_m : ndarray, shape (n, 3)
+        Points.
+    normals : ndarray, shape (n, 3)
+        Normals of the wall, or of marks visible from one side; nan for other points.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
     """
     back = place_m - xyz_m
     distance = np.linalg.norm(back, axis=1)

@@ -45,9 +45,13 @@ def normalized_error(d, U_new, U_former, c=0.0):
 def critical_correlation(d, U_new, U_former):
     """Correlation at which |E_n| is 1.
 
-    Nan if |E_n| is below 1 for every correlation, or a U unknown.
+    The result is nan if |E_n| is below 1 for every correlation, if a U is unknown, or if the
+    difference is zero. It is -1 if |E_n| exceeds 1 for every correlation.
 
-    The result is -1 if |E_n| exceeds 1 for every correlation. A difference of zero gives nan.
+    Parameters
+    ----------
+    d, U_new, U_former : array_like
+        Difference, and expanded uncertainties of equal coverage, in one unit.
     """
     d, new, former = np.broadcast_arrays(
         *(np.asarray(x, dtype=float) for x in (d, U_new, U_former))
@@ -96,13 +100,16 @@ class TableUncertainty:
         if self.deliveries_by is None:
             return np.full(len(low), np.nan)
         if self.deliveries_by == "record":
+            # covariance = factor factor', so U of a difference is the norm of the difference
             apart = self.factor_m3[high] - self.factor_m3[low]
             U = np.sqrt(np.einsum("ij,ij->i", apart, apart))
         elif self.deliveries_by == "proportional":
+            # errors proportional to the volume are fully correlated between rows
             part = self.U_m3[-1] / self.volume_m3[-1]
             U = part * np.abs(self.volume_m3[high] - self.volume_m3[low])
         else:
             return np.hypot(self.U_m3[low], self.U_m3[high])
+        # both rows of a delivery are rounded independently
         return np.hypot(U, np.sqrt(2) * self.rounding_m3)
 
 
@@ -129,6 +136,7 @@ def uncertainty_at(table, dips_m, volume_m3, k, error_m3=0.0):
     error_m3 : float
         Largest interpolation error, included as a rectangular distribution.
     """
+    # rectangular distributions: width of one digit, half width of the interpolation error
     spread = np.hypot(table.volume_quantum_m3 / np.sqrt(12), error_m3 / np.sqrt(3))
     rounding = float(k * spread)
     if table.U_m3 is None:
@@ -150,6 +158,7 @@ def _factor_at(table, dips, stated):
     part = ((dips - below) / (table.height_m[upper] - below))[:, None]
     factor = (1 - part) * table.factor_m3[upper - 1] + part * table.factor_m3[upper]
     length = np.sqrt(np.einsum("ij,ij->i", factor, factor))
+    # one scale for all rows, so that the factor remains that of one covariance
     usual = np.median(stated[length > 0] / length[length > 0]) if (length > 0).any() else 1.0
     return usual * factor
 
@@ -175,7 +184,17 @@ class Deliveries:
 
 
 def deliveries_between(basis, former_U, new_U, c, low, high):
-    """Return the `Deliveries` between rows of a OneBasis, given by their indices."""
+    """Return the `Deliveries` between rows of a OneBasis.
+
+    Parameters
+    ----------
+    basis : OneBasis
+    former_U, new_U : TableUncertainty
+    c : float
+        Correlation of the errors of the two tables.
+    low, high : array_like of int, shape (n,)
+        Indices of the rows.
+    """
     low, high = np.atleast_1d(low), np.atleast_1d(high)
     new = basis.new_m3[high] - basis.new_m3[low]
     former = basis.on_basis_m3[high] - basis.on_basis_m3[low]

@@ -177,9 +177,10 @@ def interpolation_error_m3(table, dips_m):
     part = np.diff(heights)[:-1] / (heights[2:] - heights[:-2])
     chord = volumes[:-2] + part * (volumes[2:] - volumes[:-2])
     off = np.maximum(np.abs(volumes[1:-1] - chord) - table.volume_quantum_m3, 0.0)
+    # Four rows around each interval: rows next to a kink are further off than those beyond.
     off = np.pad(off, 2, mode="edge")  # from the row below the first to the row above the last
     four = np.array([off[k : len(off) - 3 + k] for k in range(4)])
-    smooth = four.min(axis=0)
+    smooth = four.min(axis=0)  # part of the distance that a smooth curve explains
     below, above = four[1] - smooth, four[2] - smooth
     kink = 2 * below * above / np.maximum(below + above, 1e-300)
     bound = smooth / 4 * SPARE + kink
@@ -201,6 +202,7 @@ def _fitted_zero(former, new, facts, densities):
     """Fit the height of the new zero above the former one to the volumes: (height, u), or None."""
     zero, difference = 0.0, None
     quanta = np.hypot(former.volume_quantum_m3, new.volume_quantum_m3) / np.sqrt(12)
+    # The area depends on the zero, so the linear adjustment is repeated.
     for _ in range(ROUNDS):
         try:
             rows = rows_in_both(former, new, zero)
@@ -252,9 +254,9 @@ def _zero_step(step, shift, former, new):
 
 
 def _steps(former, new, facts, densities, zero, rows, until="rounding"):
-    """Return {name.
+    """Return the steps, and the former volumes as printed and on the new basis, at new dips.
 
-    Step}, and the former volumes as printed and on the new basis, at dips of new rows.
+    The steps are {name: Step}. `until` is the name of the last step.
     """
     dips = new.height_m[rows]
     before = volume_at(former, dips)
@@ -295,9 +297,10 @@ def _temperature(former, new, facts, densities, zero, dips, basis):
         return _none(dips, "not_declared", lacking=("kind",), **values)
     scale = 1 + facts.expansion_per_k * (is_now - was)
     if facts.kind == "vertical" and not facts.dips_expand:
-        added = basis * (scale**2 - 1)
+        added = basis * (scale**2 - 1)  # only areas expand
     else:
         area = slopes_m2(dips, basis) if len(dips) > 2 else 0.0
+        # V s^3 at the dip h / s, to first order in the change of the dip
         added = basis * (scale**3 - 1) + scale**3 * area * dips * (1 / scale - 1)
     return Step(added, "done", "declared", **values)
 
@@ -328,8 +331,18 @@ def radii_of_rows(rings, dips, volumes, density, zone=None):
     """Unloaded radii (courses,) of the rings, from the rise of the volumes within them, m.
 
     A ring between two rows takes the radius of the next ring below. Over the critical zone of a
-    roof (`zone`: its lower and upper dip), the rows rise by less than the ring holds. The ring is
-    then evaluated on one side of the zone.
+    roof, the rows rise by less than the ring holds. The ring is then evaluated on one side of the
+    zone.
+
+    Parameters
+    ----------
+    rings : Rings
+    dips, volumes : (rows,) ndarray
+        Dips, m, and volumes, m3.
+    density : float
+        Density of the head in the volumes, kg/m3.
+    zone : (float, float), optional
+        Lower and upper dip of the critical zone.
     """
     radii, edges = np.empty(len(rings.thickness_m)), rings.edges_m.copy()
     edges[-1] = max(edges[-1], dips[-1])
@@ -337,11 +350,13 @@ def radii_of_rows(rings, dips, volumes, density, zone=None):
     for _ in range(2):  # first without, then with the head in rings of these radii
         for k in range(len(radii)):
             inside = np.flatnonzero((dips >= edges[k] - 1e-9) & (dips <= edges[k + 1] + 1e-9))
+            # The lower half of the first ring may contain the bottom.
             inside = inside[len(inside) // 2 :] if k == 0 and len(inside) > 5 else inside
             inside = _beside(zone, inside, dips)
             radii[k] = radii[k - 1] if k else np.sqrt(volumes[-1] / np.pi / dips[-1])
             if len(inside) > 1:
                 first, last = inside[0], inside[-1]
+                # pi r^2 times the height equals the rise without the effect of the head
                 rise = volumes[last] - head[last] - volumes[first] + head[first]
                 radii[k] = np.sqrt(max(rise, 1e-9) / np.pi / (dips[last] - dips[first]))
         head = rings.volume_m3(dips, radii, density) - rings.volume_m3(dips, radii, 0.0)

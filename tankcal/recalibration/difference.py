@@ -66,6 +66,7 @@ def adjust_difference(facts, dips_m, difference_m3, volume_m3, sd_m3, usable):
     if rows.sum() < columns.shape[1] + SPARE_ROWS:
         return None
     sd = max(sd_m3, FINEST * float(volume_m3[-1]))
+    # Columns are scaled to 1, as areas and heights differ in magnitude.
     size = np.abs(columns[rows]).max(axis=0)
     design, value = columns[rows] / size, difference_m3[rows]
     normal = design.T @ design
@@ -75,6 +76,7 @@ def adjust_difference(facts, dips_m, difference_m3, volume_m3, sd_m3, usable):
     solution = inverse @ (design.T @ value)
     left = value - design @ solution
     dof = len(value) - len(solution)
+    # Residuals may exceed rounding, but u is never smaller than rounding requires.
     variance = max(sd**2, float(left @ left) / dof)
     u = np.sqrt(variance * np.diag(inverse)) / size
     areas = np.full((2, len(reached) - 1), np.nan)
@@ -94,7 +96,7 @@ def _columns(facts, dips, volume, area):
     if facts.is_shell:
         edges = facts.edges_m()
         wet = np.clip(dips[:, None], edges[:-1], edges[1:]) - edges[:-1]
-        wet[:, -1] = np.maximum(dips - edges[-2], 0.0)
+        wet[:, -1] = np.maximum(dips - edges[-2], 0.0)  # the last course has no upper end
         return np.column_stack([area, wet])
     if facts.kind == "horizontal":
         return np.column_stack([area, volume, dips * area])
@@ -108,9 +110,16 @@ def slopes_m2(dips_m, volume_m3, sd_m3=0.0):
 
     A window has equal lengths below and above its row. Near the ends it is shorter; at the ends it
     is one step.
+
+    Parameters
+    ----------
+    dips_m, volume_m3 : (rows,) ndarray
+    sd_m3 : float, optional
+        Standard deviation of a volume by rounding, which determines the length of the windows.
     """
     usual = (volume_m3[-1] - volume_m3[0]) / (dips_m[-1] - dips_m[0])
     half = max(LEAST_WINDOW_M, LEVEL_PARTS * sd_m3 / max(usual, 1e-9)) / 2
+    # at least one step, at most a quarter of the range on each side
     half = min(max(half, float(np.median(np.diff(dips_m)))), (dips_m[-1] - dips_m[0]) / 4)
     room = np.minimum(dips_m - dips_m[0], dips_m[-1] - dips_m)
     half = np.minimum(half, np.maximum(room, float(np.diff(dips_m).min())))

@@ -76,15 +76,18 @@ def find_fittings(dips_m, left_m3, design, sd_m3, longest_m=np.inf, most=4):
     list of (Fitting, float)
     """
     places = dips_m[np.unique(np.linspace(0, len(dips_m) - 1, MOST_PLACES).astype(int))]
+    # Ramps without the part that the unknowns of the adjustment absorb: P R, P = 1 - q q'.
     q = np.linalg.qr(design / sd_m3[:, None])[0]
     ramps = np.maximum(dips_m[:, None] - places, 0.0) / sd_m3[:, None]
     left = ramps - q @ (q.T @ ramps)
     reach = np.maximum(np.einsum("np,np->p", ramps, ramps), 1e-300)
     gram, of_left = left.T @ left, left.T @ (left_m3 / sd_m3)
+    # (R_b - R_t)' P (R_b - R_t) of all pairs; too small values are rounding errors
     apart = np.diag(gram)[:, None] + np.diag(gram) - 2 * gram
     is_told = apart > ROUNDING * np.maximum(reach[:, None], reach)
     height = places - places[:, None]
     is_told &= (height > 0) & (height <= longest_m)
+    # numerator, reduction of chi2, and slope of the ramp: area of the fitting
     along = of_left[:, None] - of_left
     gain = np.where(is_told, along**2 / np.where(is_told, apart, 1.0), 0.0)
     slopes = along / np.where(is_told, apart, 1.0)
@@ -99,7 +102,7 @@ def find_fittings(dips_m, left_m3, design, sd_m3, longest_m=np.inf, most=4):
             slice(max(low - APART, 0), low + APART + 1),
             slice(max(high - APART, 0), high + APART + 1),
         )
-        likely[near] = 0.0
+        likely[near] = 0.0  # the next fitting is well apart
         low, high = _standing(gain, low, high, slopes[low, high])
         volume = float(slopes[low, high] * height[low, high])
         fittings.append((Fitting(float(places[low]), float(places[high]), volume), best))
@@ -120,8 +123,17 @@ def _standing(gain, low, high, slope):
 def in_other_pairs(fittings, near_m, least_share):
     """Pair the kinks differently: fittings one above the other instead of overlapping ones.
 
-    Kinks nearer than `near_m` are merged. Kinks below a share of the largest change of slope are
-    ignored.
+    Parameters
+    ----------
+    fittings : sequence of Fitting
+    near_m : float
+        Kinks nearer than this are merged.
+    least_share : float
+        Kinks below this share of the largest change of slope are ignored.
+
+    Returns
+    -------
+    tuple of Fitting
     """
     kinks = []
     for fitting in fittings:

@@ -27,13 +27,28 @@ def sd_of_rows(former):
 
 
 def rounded_again(solution, rows, quantum_m3, draws=DRAWS):
-    """Rounding errors (draws, rows) of tanks compatible with a Fit, m3."""
+    """Rounding errors of tanks compatible with a Fit, m3.
+
+    Parameters
+    ----------
+    solution : Fit
+    rows : Rows
+    quantum_m3 : float
+        Value of the last printed digit.
+    draws : int, optional
+
+    Returns
+    -------
+    (draws, rows) ndarray
+    """
     sds = np.sqrt(np.diag(solution.cofactor))
     random = np.random.default_rng(SEED)
     safe = np.where(sds > 0, sds, 1.0)
+    # Root of the covariance through the correlation matrix, which is better conditioned.
     values, vectors = np.linalg.eigh(solution.cofactor / np.outer(safe, safe))
     roots = vectors * np.sqrt(np.maximum(values, 0)) * safe[:, None]
     moves = random.normal(size=(draws, len(sds))) @ (solution.design @ roots).T
+    # A common offset of all rows gives other rounding errors of an equally likely table.
     shifts = random.uniform(0, 1, (draws, 1))
     places = (solution.state.volume_m3(rows.dip_m) + moves) / quantum_m3 + shifts
     return (np.round(places) - places) * quantum_m3
@@ -56,6 +71,7 @@ def _by_steps(solution, rows, quantum):
     sds = np.sqrt(np.diag(solution.cofactor))
     if quantum <= 0 or solution.dof <= 0:
         return np.ones(len(sds))
+    # Errors of the unknowns by errors of the rows: Q A' P.
     gain = solution.cofactor @ (solution.design / rows.sd_m3[:, None] ** 2).T
     errors = rounded_again(solution, rows, quantum) @ gain.T
     moved = np.sqrt(np.mean(errors**2, axis=0))
@@ -72,5 +88,6 @@ def roughness(solution, rows):
     size = np.sqrt(solution.chi2 / solution.dof) if solution.dof > 0 else 1.0
     if size < ROUGH:
         return 1.0
+    # lag-one autocorrelation of the residuals
     c = np.clip(left[1:] @ left[:-1] / (left @ left), 0.0, 0.99)
     return float(size * np.sqrt((1 + c) / (1 - c)))
