@@ -93,7 +93,17 @@ def longest_chords(height, volume, at, written, last, is_open, eps, rows):
 
 
 def largest_error(height, volume, at, written, rows):
-    """Largest distance of the chords through the given rows from the rows that they pass."""
+    """Largest distance of the chords through the given rows from the rows that they pass.
+
+    Parameters
+    ----------
+    height, volume : (rows,)
+        The table.
+    at, written : (rows,)
+        Heights and volumes as written.
+    rows : sequence of int
+        Rows of the chords.
+    """
     largest = 0.0
     for n in range(len(rows) - 1):
         i, j = rows[n], rows[n + 1]

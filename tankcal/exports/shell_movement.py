@@ -62,6 +62,7 @@ def shortening_m(level_m, courses, density_kg_m3, e_pa, zero_m=0.0):
     total, bottom = np.zeros_like(surface), 0.0
     for height, thickness, radius in courses:
         deep, shallow = (np.maximum(surface - z, 0) for z in (bottom, bottom + height))
+        # integral of (L - z) r dz over the wet part of the course, divided by t
         total += radius * (deep**2 - shallow**2) / (2 * thickness)
         bottom += height
     return POISSON * density_kg_m3 * STANDARD_GRAVITY / e_pa * total
@@ -86,6 +87,7 @@ def gauge_correction(top_m, courses, density_kg_m3, e_pa, zero_m=0.0):
         level = np.append(even, start)
         true = shortening_m(level, courses, density_kg_m3, e_pa, zero_m)
         rise, scale = np.maximum(level - start, 0), true.max()
+        # Minimise the bound e with -e <= D rise - movement <= e; unknowns D and e.
         rows = np.column_stack([np.append(rise, -rise), np.full(2 * len(rise), -1.0)])
         solution = linprog([0, 1], rows, np.append(true, -true) / scale, bounds=[(0, None)] * 2)
         return solution.x * scale

@@ -82,17 +82,19 @@ def leave_one_out(rows):
     others = sound[np.minimum(place, len(sound) - 1)]
     row = sound[screened]
     apart = (rows.height[others] - rows.height[row][:, None]) * is_in
+    # Heights scaled to 1 keep the powers of the cubic well conditioned.
     apart /= np.abs(apart).max(axis=1)[:, None]
     weight = rows.weight[others] * is_in
     basis = apart[..., None] ** np.arange(DEGREE + 1) * weight[..., None]
     values = (rows.volume[others] - rows.volume[row][:, None]) * weight
     q, _ = np.linalg.qr(basis)
     number = np.arange(len(screened))
+    # Row of the hat matrix: prediction with the row. Division by 1 - leverage removes the row.
     hat = np.einsum("nk,njk->nj", q[number, screened - start], q)
     leverage = hat[number, screened - start]
     spared = np.maximum(1 - leverage, LEAST_SPARED)
     difference[row] = -np.einsum("nj,nj->n", hat, values) / spared
-    weights = (np.abs(hat).sum(axis=1) - leverage) / spared
+    weights = (np.abs(hat).sum(axis=1) - leverage) / spared  # sum |w| of the prediction
     is_predicted = 1 - leverage > LEAST_SPARED
     allowed[row] = np.where(is_predicted, rows.noise * (1 + weights) * (1 + 1e-9), np.inf)
     return difference, allowed

@@ -105,6 +105,7 @@ class Curve:
     def at(self, basis):
         """Values (m,) and their largest errors by rounding (m,) at rows (m, p) of the basis."""
         q, r = self._qr
+        # weights of the observed values in the predicted values
         weights = q @ np.linalg.solve(r.T, basis.T)
         return (self.values * self.weight) @ weights, self.noise * np.abs(weights).sum(axis=0)
 
@@ -144,6 +145,7 @@ def _bases(rows, members, x):
     """Polynomials of degree 1 to 5, and the series of a lying cylinder at the ends of the table."""
     bases = [x[:, None] ** np.arange(degree + 1) for degree in range(1, 6) if len(x) >= degree + 3]
     sound = np.flatnonzero(rows.is_sound)
+    # The volume of a lying cylinder grows with the power 1.5 of the height above its end.
     powers = np.array([0, 1.5, 2, 2.5, 3, 3.5])
     for is_end, away in (
         (members[0] == sound[0], x - x[0]),
@@ -175,6 +177,7 @@ def _blocks(curve, members, ends):
     number = np.arange(count)[:, None]
     blocks = ((number >= first) & (number < end)) * curve.weight[:, None]
     maker, residuals = curve.residual_maker, curve.residuals
+    # A block adds one column to the basis: its size and the rss follow without another fit.
     moved = maker @ blocks
     norm = np.einsum("nk,nk->k", blocks, moved)
     # relative, as a row with a rounded height has a small weight
@@ -186,6 +189,7 @@ def _blocks(curve, members, ends):
     hypotheses = []
     for k in np.argsort(rss)[:12]:
         left = residuals - size[k] * moved[:, k]
+        # residual maker of the basis with the block
         maker_left = maker - np.outer(moved[:, k], moved[:, k]) / norm[k]
         excess = _excess(left, maker_left, curve.noise) if parameters <= PLAIN else np.inf
         low, high = int(members[first[k]]), int(members[end[k] - 1])

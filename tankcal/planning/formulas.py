@@ -165,8 +165,14 @@ def hyperfocal_m(focal_mm, f_number, sharp_mm):
 def depth_of_field_m(focal_mm, f_number, sharp_mm, focus_m):
     """Nearest and farthest sharp distance from the lens, m.
 
-    The farthest distance is inf if the focus is at the hyperfocal distance or beyond. focus_m is
-    the focus distance, m; the other parameters are those of `hyperfocal_m`.
+    The farthest distance is inf if the focus is at the hyperfocal distance or beyond.
+
+    Parameters
+    ----------
+    focal_mm, f_number, sharp_mm : float
+        As in `hyperfocal_m`.
+    focus_m : float
+        Focus distance, m.
     """
     h, f = hyperfocal_m(focal_mm, f_number, sharp_mm), METRE * focal_mm
     s = _beyond(f, focus_m)
@@ -198,6 +204,15 @@ def f_number_for(focal_mm, sharp_mm, near_m, far_m):
     """Smallest f-number that keeps all points between two distances sharp.
 
     From the depth of field: H - f = near (s - f) / (s - near) at the focus of `focus_for_m`.
+
+    Parameters
+    ----------
+    focal_mm : float
+        Focal length f, mm.
+    sharp_mm : float
+        Largest blur that counts as sharp, mm.
+    near_m, far_m : float
+        Nearest and farthest distance, m.
     """
     f, s = METRE * positive("focal_mm", focal_mm), focus_for_m(near_m, far_m)
     if not f < near_m < far_m:
@@ -209,7 +224,14 @@ def f_number_for(focal_mm, sharp_mm, near_m, far_m):
 def diffraction_mm(f_number, focal_mm=None, focus_m=np.inf, wavelength_mm=GREEN_MM):
     """Diameter 2.44 lambda N (1 + m) of the Airy disk, mm.
 
-    focal_mm and focus_m determine m = f / (s - f); m is 0 for an infinite focus distance.
+    Parameters
+    ----------
+    f_number : float
+        N.
+    focal_mm, focus_m : float, optional
+        Focal length, mm, and focus distance, m, for m = f / (s - f); m is 0 for an infinite focus
+        distance.
+    wavelength_mm : float, optional
     """
     m = 0.0
     if np.isfinite(focus_m):
@@ -241,7 +263,17 @@ def target_diameter_m(scale, pixel_mm, pixels=PIXELS_OF_CIRCLE, slant_rad=0.0):
 
 
 def coded_target_m(scale, pixel_mm, cells, pixels=PIXELS_OF_BIT, slant_rad=0.0):
-    """Smallest side of a coded target, m; `cells` counts the cells across, border included."""
+    """Smallest side of a coded target, m.
+
+    Parameters
+    ----------
+    scale, pixel_mm, slant_rad
+        As in `target_diameter_m`.
+    cells : float
+        Number of cells across, border included.
+    pixels : float, optional
+        Width of the image of a cell, pixels.
+    """
     return positive("cells", cells) * target_diameter_m(scale, pixel_mm, pixels, slant_rad)
 
 

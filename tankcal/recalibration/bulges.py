@@ -46,7 +46,16 @@ def largest_bulge_m(bulges_m):
 
 
 def bulge_volume_m3(rings: Rings, dips_m, radii_m, bulges_m):
-    """Volume added by the profiles below each dip, shape (rows,), m3."""
+    """Volume added by the profiles below each dip, shape (rows,), m3.
+
+    Parameters
+    ----------
+    rings : Rings
+    dips_m : (rows,) ndarray
+    radii_m : (courses,) ndarray
+    bulges_m : (courses, degrees) ndarray
+        Coefficients b.
+    """
     return np.einsum("rcj,cj->r", _unit_volumes(rings, dips_m, radii_m)[0], bulges_m)
 
 
@@ -91,6 +100,12 @@ def show_bulges(dips_m, volumes_m3, sd_m3, edges_m):
 
     Deadwood causes kinks: a smooth profile of its course would leave most of the residuals of a
     parabola.
+
+    Parameters
+    ----------
+    dips_m, volumes_m3, sd_m3 : (rows,) ndarray
+    edges_m : (courses + 1,) ndarray
+        Dips of the edges of the courses.
     """
     shown = []
     for low, high in pairwise(edges_m):

@@ -9,7 +9,7 @@ second estimate; the larger estimate is used.
 
 import numpy as np
 
-ROUGH = 1.15  # rms residual over rms rounding error; above it, rows contain other errors
+ROUGH = 1.15  # largest rms residual over rms rounding error of rows without other errors
 DRAWS, SEED = 150, 21  # number of simulated roundings, and seed
 
 

@@ -168,7 +168,21 @@ def flat_start(rows):
 def fit_ends(rows, name, diameter, length, zero, dip_from_a_m, rest=(), tilt=None, is_held=False):
     """Return the SolidFit with ends of one form, or None if there is no solution.
 
-    tilt: None for a level tank, else the start value of the tilt, or its fixed value if is_held.
+    Parameters
+    ----------
+    rows : WetRows
+    name : str
+        Form of the ends, a name of `ENDS`.
+    diameter, length, zero : float
+        Start values, m.
+    dip_from_a_m : float or None
+        Position of the dip along the axis; None: half the length.
+    rest : sequence of float, optional
+        Start value of the depth of the ends.
+    tilt : float, optional
+        None for a level tank, else the start value of the tilt, or its fixed value.
+    is_held : bool, optional
+        Whether the tilt is fixed.
     """
     end_of, is_free, part = ENDS[name]
     names = ("diameter", "length", "zero")
@@ -194,7 +208,20 @@ def fit_ends(rows, name, diameter, length, zero, dip_from_a_m, rest=(), tilt=Non
 
 
 def fit_solid(rows, kind, ends, names, start, solid):
-    """Return the least-squares SolidFit; raise SolutionError if the unknowns leave their range."""
+    """Return the least-squares SolidFit; raise SolutionError if the unknowns leave their range.
+
+    Parameters
+    ----------
+    rows : WetRows
+    kind : {"horizontal", "sphere"}
+    ends : str or None
+    names : tuple of str
+        Names of the unknowns.
+    start : ndarray, shape (unknowns,)
+        Start values.
+    solid : callable
+        Function of the unknowns that returns the tank.
+    """
     far, zero = 1e6 * np.ones(len(rows.height)), names.index("zero")
 
     def residuals(x):
@@ -215,6 +242,7 @@ def fit_solid(rows, kind, ends, names, start, solid):
     if np.any(at_limit):
         raise SolutionError(no_fit())
     chi2, dof = float(solved.fun @ solved.fun), len(rows.height) - len(names)
+    # Scaled unknowns of similar size make the rank decision independent of their units.
     covariance, u = _covariance(solved.jac * scale, scale, _variance_factor(chi2, dof))
     left = solved.fun * rows.sd
     return SolidFit(
@@ -225,6 +253,7 @@ def fit_solid(rows, kind, ends, names, start, solid):
 
 def _variance_factor(chi2, dof):
     factor = chi2 / dof
+    # The factor applies only if it exceeds its expectation by three standard deviations.
     return factor if factor > 1 + 3 * np.sqrt(_SPREAD / dof) else 1.0
 
 
@@ -245,6 +274,7 @@ def _covariance(jacobian, scale, factor):
     _, values, rows = np.linalg.svd(jacobian, full_matrices=False)
     good = values > _STEEP * values[0]
     inverse = (rows[good].T / values[good] ** 2) @ rows[good]
+    # unknowns with a share in the undetermined directions
     lost = (rows[~good] ** 2).sum(axis=0) > 1e-6
     covariance = factor * inverse * np.outer(scale, scale)
     return covariance, np.where(lost, np.inf, np.sqrt(np.diag(covariance)))

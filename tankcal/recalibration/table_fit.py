@@ -254,6 +254,7 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     moving = np.setdiff1d(np.arange(len(state.unknowns)), held)
     observed = np.concatenate([volumes_m3, about])
     variances = np.concatenate([sd_m3**2, sds**2])
+    # Weak priors are added as observations of the unknowns themselves.
     rows = np.eye(len(state.unknowns))[known][:, moving]
 
     def misclosure(now):
@@ -266,6 +267,7 @@ def fit(state, dips_m, volumes_m3, sd_m3):
         before, cost = now, w @ (w / variances)
         step = np.zeros(len(now.unknowns))
         step[moving] = adjusted.unknowns
+        # Gauss-Newton step, halved until the cost does not rise.
         for _ in range(MOST_HALVINGS):
             now = before.with_unknowns(before.unknowns + step)
             w = misclosure(now)

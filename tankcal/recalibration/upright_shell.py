@@ -65,6 +65,7 @@ class Rings:
         head = np.maximum(dips_m[:, None] - self.edges_m[:-1], 0.0)
         above = self._cut_m2(radii_m, soft, head)
         below = np.zeros_like(above)
+        # A higher edge exchanges the cross section above it for the one below.
         below[:, 1:] = self._cut_m2(radii_m[:-1], soft[:-1], head[:, 1:])
         return by_radius, by_density, (below - above) * (head > 0)
 

@@ -73,7 +73,17 @@ def tank_of_rules(facts, former, new):
 
 
 def legal_numbers(rule, tank, former, new, basis, former_U, new_U):
-    """Return the `LegalNumber` of each limit of a rule for a kind of tank."""
+    """Return the `LegalNumber` of each limit of a rule for a kind of tank.
+
+    Parameters
+    ----------
+    rule : Rule
+    tank : str
+        Kind of tank in the terms of the rules.
+    former, new : FormerTable
+    basis : OneBasis
+    former_U, new_U : TableUncertainty
+    """
     numbers = [
         _deviation(limit, basis, former_U, new_U)
         for limit in rule.deviation
