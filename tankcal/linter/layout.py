@@ -116,7 +116,7 @@ def _table(grid, blocks, numbers, log):
     in_feet = feet_reader(grid.name, heights, first.height_heading, rows, log)
     in_fractions = None if in_feet else fraction_reader(heights, first.height_heading, style)
     orders = [[_entry(item, style, in_feet or in_fractions) for item in order] for order in orders]
-    entries = min(orders, key=_turns)
+    entries = min(orders, key=_count_reversals)
     height_m = 1.0 if in_feet else _height_unit(grid.name, first, in_fractions, entries, log)
     complaints = [problem for block in blocks for problem in block.complaints]
     if blocks[0].has_heading:
@@ -296,7 +296,7 @@ def _entry(cells, style, read_height):
     return Entry(row, height_name, volume_name, height, volume, **beside)
 
 
-def _turns(entries):
+def _count_reversals(entries):
     """Number of reversals of the heights."""
     heights = [entry.height.value for entry in entries if entry.height.value is not None]
     rises = [b > a for a, b in pairwise(heights)]

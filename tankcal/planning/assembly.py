@@ -46,10 +46,10 @@ def assemble_plan(job, given, bars, folder):
         ties.append(tie)
         extra |= ends
         facing |= dict.fromkeys(ends, out)
-    ties += _listed(given.ties)
+    ties += _listed_ties(given.ties)
     places = dict(zip(targets.names, targets.xyz_m, strict=True)) | extra
     places |= {setup.name: setup.xyz_m for setup in setups}
-    known = _known(job.measurements.control, places)
+    known = _known_points(job.measurements.control, places)
     extra |= {
         control_point.name: control_point.xyz_m
         for control_point in known
@@ -81,7 +81,7 @@ def assemble_plan(job, given, bars, folder):
     )
 
 
-def _listed(tables):
+def _listed_ties(tables):
     """Return the ties listed in the tables of a plan."""
     ties = []
     for name, table in tables.items():
@@ -99,7 +99,7 @@ def _listed(tables):
     return ties
 
 
-def _known(control, places):
+def _known_points(control, places):
     """Return the known points; a blank coordinate takes its nominal value where the plan has it.
 
     A check point (use = "check") has a position, but no standard deviations: it does not constrain

@@ -33,14 +33,14 @@ def find_separate_bodies(plan, seen):
     for k, setup in enumerate(plan.setups):
         seen_there = {seen.points[i] for i in np.flatnonzero(seen.on_setup[k])}
         bodies.append(([setup.name], seen_there | {setup.name}))
-    while (pair := _linked(bodies)) is not None:
+    while (pair := _find_linked(bodies)) is not None:
         first, second = pair
         bodies = [body for body in bodies if body is not first and body is not second]
         bodies.append((first[0] + second[0], first[1] | second[1]))
     return tuple(tuple(names) for names, _ in bodies if names)
 
 
-def _linked(bodies):
+def _find_linked(bodies):
     """Return two bodies with enough common points, or None."""
     for i, body in enumerate(bodies):
         for earlier in bodies[:i]:

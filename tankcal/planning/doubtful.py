@@ -75,7 +75,7 @@ def single_readings(plan, observations):
     """Return the SingleReadings of observations of a Plan."""
     trace, times = observations.trace, {}
     if trace.table in TAPED:
-        return _of_ties(plan, observations)
+        return _single_ties(plan, observations)
     if trace.table in SIGHTED:
         times = {setup.name: setup.sets for setup in plan.setups}
     elif observations.kind == ImageCoordinates.kind:
@@ -93,7 +93,7 @@ def _share_of_set(directions):
     return weight / np.bincount(directions.set, weight)[directions.set]
 
 
-def _of_ties(plan, observations):
+def _single_ties(plan, observations):
     """Return SingleReadings of ties; ties of one line with different sds are separate groups."""
     trace, lots = observations.trace, defaultdict(list)
     for tie in plan.ties:
@@ -184,7 +184,9 @@ def reliability(plan, predicted, covariance, by_points_m2):
     adjusted = predicted.adjusted
     problem, solution = adjusted.problem, adjusted.solution
     # Q g' is common to all readings; j Q g' is the effect of a whitened unit error.
-    pull = _pull(solution, problem.layout.points[covariance.points].ravel(), by_points_m2)
+    pull = _covariance_with(
+        solution, problem.layout.points[covariance.points].ravel(), by_points_m2
+    )
     groups = []
     for number, table in enumerate(problem.observations):
         if table.trace is None:
@@ -194,11 +196,11 @@ def reliability(plan, predicted, covariance, by_points_m2):
         columns = problem.model.groups[number].columns
         effect = np.abs(np.einsum("nmk,nk->nm", jac, pull[columns]))
         single = single_readings(plan, table)
-        groups += _by_name(table, single, single.redundancy(r), effect)
+        groups += _group_by_name(table, single, single.redundancy(r), effect)
     return tuple(groups)
 
 
-def _pull(solution, columns, gradient):
+def _covariance_with(solution, columns, gradient):
     """Product Q g' of a gradient g, shape (unknowns + 1,).
 
     The last element (fixed unknowns) is 0.
@@ -206,7 +208,7 @@ def _pull(solution, columns, gradient):
     return np.append(covariances(solution.cofactor, columns, gradient[None])[:, 0], 0.0)
 
 
-def _by_name(table, single, redundancy, effect):
+def _group_by_name(table, single, redundancy, effect):
     """Yield the GroupReliability of each name in one table of observations.
 
     single: SingleReadings of k readings; redundancy: (k, m) of the readings; effect: (n, m) of the

@@ -18,7 +18,7 @@ from tankcal.planning.given import PLAN_FILE
 def foreseen(prediction):
     """Return a tuple of Problem for the plan, its network, the wall and the table."""
     tabled = prediction.tabled
-    of_table = check_table(_correlated(tabled), tabled.wall, tabled.made)
+    of_table = check_table(_with_full_covariance(tabled), tabled.wall, tabled.made)
     of_run = (
         *prediction.predicted.frame.warnings,
         *open_questions(tabled.job, prediction.datum, tabled.job.points.causes),
@@ -30,7 +30,7 @@ def foreseen(prediction):
     )
     return (
         *prediction.plan.warnings,
-        *_unseen(prediction),
+        *_undetermined_targets(prediction),
         *idle_ties(prediction.plan, prediction.points),
         *_uncontrolled(prediction.reliability),
         *check_bases(prediction.measurements),
@@ -41,7 +41,7 @@ def foreseen(prediction):
     )
 
 
-def _correlated(tabled):
+def _with_full_covariance(tabled):
     """Return the job of a PredictedTable with the full covariance of its points."""
     points, adjusted = tabled.job.points, tabled.covariance.adjusted
     number = {name: i for i, name in enumerate(adjusted.survey.points)}
@@ -49,7 +49,7 @@ def _correlated(tabled):
     return replace(tabled.job, points=replace(points, covariance_m2=covariance))
 
 
-def _unseen(prediction):
+def _undetermined_targets(prediction):
     """Return a Problem about targets that are not determined."""
     targets = set(prediction.plan.targets.names)
     lost = [point.name for point in prediction.undetermined if point.name in targets]
@@ -94,7 +94,7 @@ def idle_ties(plan, points):
 
 def _uncontrolled(groups):
     """Return a Problem about kinds of readings (`GroupReliability`) with uncontrolled values."""
-    idle = [_of_group(group) for group in groups if group.uncontrolled]
+    idle = [_describe_group(group) for group in groups if group.uncontrolled]
     if not idle:
         return ()
     text = message(
@@ -105,7 +105,7 @@ def _uncontrolled(groups):
     return (Problem(PLAN_FILE, text),)
 
 
-def _of_group(group):
+def _describe_group(group):
     if group.count == 1:
         template = "the only value of {group} ({points})"
         return message("plan_only_value", template, group=group.kind, points="-".join(group.of))

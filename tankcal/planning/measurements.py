@@ -159,8 +159,8 @@ def draw_measurements(plan, measurements, predicted, rng=None):
         None: no errors. Otherwise each reading has its own error, and the readings of an instrument
         share errors of its scale and offset.
     """
-    values, draw = _computed(predicted), _drawn(rng)
-    off = {tool.name: _off(tool, draw) for tool in measurements.instruments}
+    values, draw = _nominal_values(predicted), _error_function(rng)
+    off = {tool.name: _instrument_errors(tool, draw) for tool in measurements.instruments}
     tools = {tool.name: tool for tool in measurements.instruments}
     setups = {setup.name: setup for setup in measurements.setups}
     images, control = measurements.image_points, measurements.control
@@ -169,19 +169,20 @@ def draw_measurements(plan, measurements, predicted, rng=None):
     if control is not None:
         control = replace(control, xyz_m=draw(control.xyz_m, np.nan_to_num(control.sd_m)))
     readings = tuple(
-        _filled(reading, values, draw, (tools, off), setups) for reading in measurements.readings
+        _with_values(reading, values, draw, (tools, off), setups)
+        for reading in measurements.readings
     )
     return replace(measurements, image_points=images, control=control, readings=readings)
 
 
-def _drawn(rng):
+def _error_function(rng):
     """Return a function (value, sd) -> value with an error."""
     if rng is None:
         return lambda value, sd: np.array(value, dtype=float)
     return lambda value, sd: value + rng.standard_normal(np.shape(value)) * sd
 
 
-def _computed(predicted):
+def _nominal_values(predicted):
     """Return {(table, horizontal, names): value} of all readings at the nominal positions."""
     by_key, problem = {}, predicted.adjusted.problem
     for table in (*problem.observations, *(held.observations for held in problem.exact)):
@@ -197,7 +198,7 @@ def _computed(predicted):
     return by_key
 
 
-def _filled(readings, values, draw, tools, setups):
+def _with_values(readings, values, draw, tools, setups):
     """Return readings with their values; readings of points that are left out keep the value 0."""
     starts = readings.setup or readings.start
     horizontal = readings.horizontal
@@ -207,19 +208,22 @@ def _filled(readings, values, draw, tools, setups):
     if KINDS[readings.table].has("instrument"):
         names = [setups[setup].instrument for setup in readings.setup] or readings.instrument
         value = np.array(
-            [_read(setup, name, *tools) for setup, name in zip(value, names, strict=True)]
+            [
+                _instrument_reading(setup, name, *tools)
+                for setup, name in zip(value, names, strict=True)
+            ]
         )
     elif readings.table == "plumb_lines":
         return readings
     return replace(readings, value=draw(value, readings.sd))
 
 
-def _off(tool, draw):
+def _instrument_errors(tool, draw):
     """Error (scale, offset m) of an instrument; 0 for a quantity without a prior."""
     return tuple(float(draw(0.0, np.nan_to_num(u))) for u in (tool.u_scale, tool.u_offset_m))
 
 
-def _read(true_m, name, tools, off):
+def _instrument_reading(true_m, name, tools, off):
     """Reading of a true distance by an instrument at the temperature of its certificate."""
     if name is None:
         return true_m

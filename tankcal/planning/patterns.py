@@ -96,19 +96,21 @@ def targets_of(pattern, shell, courses):
     courses : sequence of Course
         Courses of the job.
     """
-    clearance = _or(pattern["weld_clearance_mm"], 1000 * CLEARANCE_M) / 1000
+    clearance = _value_or(pattern["weld_clearance_mm"], 1000 * CLEARANCE_M) / 1000
     joints = joints_of(courses)
     if pattern["heights_m"]:
         rows = np.sort(pattern["heights_m"])
         course = np.searchsorted(joints[1:-1], rows, side="right")
     else:
-        levels = int(_or(pattern["levels"], LEVELS))
+        levels = int(_value_or(pattern["levels"], LEVELS))
         rows, course = row_heights_m(courses, levels, clearance)
     n = int(pattern["generatrices"])
-    azimuth = np.radians(_or(pattern["first_azimuth_deg"], 0.0)) + 2 * np.pi * np.arange(n) / n
+    azimuth = (
+        np.radians(_value_or(pattern["first_azimuth_deg"], 0.0)) + 2 * np.pi * np.arange(n) / n
+    )
     welds = np.radians(pattern["weld_azimuths_deg"] or [])
-    azimuth = _beside(azimuth, welds, clearance / shell.radius_m)
-    offset = _or(pattern["offset_mm"], 0.0) / 1000
+    azimuth = _clear_of_welds(azimuth, welds, clearance / shell.radius_m)
+    offset = _value_or(pattern["offset_mm"], 0.0) / 1000
     row, line = (index.ravel() for index in np.indices((len(rows), n)))
     side = 1.0 if shell.outside else -1.0
     plates = np.array([plate_m(course, shell.outside) for course in courses])
@@ -121,7 +123,7 @@ def targets_of(pattern, shell, courses):
             shell.low_m + rows[row],
         ]
     )
-    weld = np.radians(_or(pattern["reference_weld_deg"], 0.0))
+    weld = np.radians(_value_or(pattern["reference_weld_deg"], 0.0))
     return Targets(
         names=tuple(f"{g + 1}-{s + 1}" for s, g in zip(row, line, strict=True)),
         section=tuple(str(s + 1) for s in row),
@@ -137,7 +139,7 @@ def targets_of(pattern, shell, courses):
     )
 
 
-def _beside(azimuth, welds, clearance):
+def _clear_of_welds(azimuth, welds, clearance):
     """Azimuths moved away from welds to the clearance (rad), on the nearer side."""
     for weld in welds:
         off = np.angle(np.exp(1j * (azimuth - weld)))
@@ -149,7 +151,7 @@ def _beside(azimuth, welds, clearance):
 def _stands(ring, shell):
     """Yield (azimuth, position (3,), station, height index) of each stand of a ring, by height."""
     n = int(ring["stations"])
-    azimuth = np.radians(_or(ring["start_azimuth_deg"], 0.0)) + 2 * np.pi * np.arange(n) / n
+    azimuth = np.radians(_value_or(ring["start_azimuth_deg"], 0.0)) + 2 * np.pi * np.arange(n) / n
     for level, height in enumerate(ring["heights_m"]):
         plan = places_around(shell.axis_m, azimuth, ring_radius_m(ring, shell))
         for i in range(n):
@@ -182,7 +184,7 @@ def photographs_of(ring, number, shell, image_sd_mm, place):
     """
     photographs = []
     sd = image_sd_mm if ring["s_um"] is None else ring["s_um"] / 1000
-    height = _or(ring["aim_height_m"], (shell.high_m - shell.low_m) / 2)
+    height = _value_or(ring["aim_height_m"], (shell.high_m - shell.low_m) / 2)
     radius = ring_radius_m(ring, shell)
     far = radius - shell.radius_m if shell.outside else radius + shell.radius_m
     for azimuth, xyz, i, level in _stands(ring, shell):
@@ -192,7 +194,7 @@ def photographs_of(ring, number, shell, image_sd_mm, place):
             (turn, roll)
             for turn in ring["directions_deg"] or [0.0]
             for roll in ring["rolls_deg"] or [0.0]
-            for _ in range(int(_or(ring["photographs"], 1)))
+            for _ in range(int(_value_or(ring["photographs"], 1)))
         ]
         for k, (turn, roll) in enumerate(exposures):
             ahead = azimuth + np.pi + np.radians(turn)
@@ -206,7 +208,7 @@ def photographs_of(ring, number, shell, image_sd_mm, place):
                         ahead, np.clip(tilt, -STEEP, STEEP), np.radians(roll)
                     ),
                     sd_mm=sd,
-                    readings=int(_or(ring["readings"], 1)),
+                    readings=int(_value_or(ring["readings"], 1)),
                     place=place,
                 )
             )
@@ -228,7 +230,7 @@ def setups_of(entry, number, shell, place):
                 direction_sd_rad=_scaled(entry["s_direction_arcsec"], ARCSEC),
                 zenith_sd_rad=_scaled(entry["s_zenith_arcsec"], ARCSEC),
                 distance_sd_m=_scaled(entry["s_mm"], 1e-3),
-                sets=int(_or(entry["sets"], 1)),
+                sets=int(_value_or(entry["sets"], 1)),
                 sights=() if entry["sights"] is False else _neighbours(ring, names[at]),
                 place=place,
             )
@@ -263,7 +265,7 @@ def tape_of(tape, shell):
     """
     azimuth, length = np.radians(tape["azimuth_deg"]), tape["length_m"]
     side = 1.0 if shell.outside else -1.0
-    radius = shell.radius_m + side * _or(tape["off_m"], 0.1)
+    radius = shell.radius_m + side * _value_or(tape["off_m"], 0.1)
     if tape["kind"] == "horizontal" and not shell.outside:
         radius = np.sqrt(max(radius**2 - (length / 2) ** 2, 0.0))
     middle, low = places_around(shell.axis_m, azimuth, radius), shell.low_m + tape["low_m"]
@@ -275,7 +277,7 @@ def tape_of(tape, shell):
     names = f"{tape['name']}a", f"{tape['name']}b"
     tie = Tie(
         tape["name"], "distances", *names, tape["s_mm"] / 1000,
-        instrument=tape["instrument"], readings=int(_or(tape["readings"], 1)),
+        instrument=tape["instrument"], readings=int(_value_or(tape["readings"], 1)),
     )  # fmt: skip
     out = side * np.array([np.sin(azimuth), np.cos(azimuth), 0.0])
     return tie, dict(zip(names, ends, strict=True)), out
@@ -295,7 +297,7 @@ def shell_of(job, pattern):
     plate = plate_m(job.courses[0], outside)
     low = job.datum.bottom_z_m
     return Shell(
-        axis_m=np.array([_or(pattern["axis_x_m"], 0.0), _or(pattern["axis_y_m"], 0.0)]),
+        axis_m=np.array([_value_or(pattern["axis_x_m"], 0.0), _value_or(pattern["axis_y_m"], 0.0)]),
         radius_m=job.tank.nominal_diameter_m / 2 + plate,
         low_m=low,
         high_m=low + sum(course.height_m for course in job.courses),
@@ -303,7 +305,7 @@ def shell_of(job, pattern):
     )
 
 
-def _or(value, default):
+def _value_or(value, default):
     return default if value is None else value
 
 

@@ -109,7 +109,7 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
             prediction.plan, prediction.measurements, prediction.predicted, rng
         )
         try:
-            adjustment, volume = _made(prediction.plan, _spoilt(drawn, blunders, rng))
+            adjustment, volume = _adjust_drawn(prediction.plan, _add_blunders(drawn, blunders, rng))
         except TankcalError as error:
             failed.append(error.texts[0])
             continue
@@ -129,7 +129,7 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
         scatter_m=xyz.std(axis=0, ddof=1),
         predicted_m=np.array([sds[name] for name in names]),
         volumes_m3=np.array(volumes),
-        predicted_volume_m3=_by_survey(prediction.table),
+        predicted_volume_m3=_u_by_survey(prediction.table),
         set_aside=np.array(aside),
     )
 
@@ -151,7 +151,7 @@ def refuse_failed(failed, runs):
         )
 
 
-def _made(plan, measurements):
+def _adjust_drawn(plan, measurements):
     """Return the Adjustment of drawn measurements, and the volume of the full tank."""
     quiet = replace(measurements.settings, explain=False)
     measurements = replace(measurements, settings=quiet)
@@ -163,7 +163,7 @@ def _made(plan, measurements):
     return adjustment, float(body.volume_m3(np.array([body.highest_m]))[0])
 
 
-def _spoilt(measurements, share, rng):
+def _add_blunders(measurements, share, rng):
     """Return measurements with blunders in a share of the readings; in x or y of image points."""
     if not share:
         return measurements
@@ -188,7 +188,7 @@ def blunders_in_sds(rng, share, count):
     return BLUNDER_SDS * sign * (rng.random(count) < share)
 
 
-def _by_survey(table):
+def _u_by_survey(table):
     """Standard uncertainty of the top row from the survey only."""
     parts = [source.columns_m3[-1] for source in table.sources if source.kind in OF_SURVEY]
     return float(np.linalg.norm(np.concatenate(parts)))

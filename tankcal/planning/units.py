@@ -54,9 +54,9 @@ def warn_of_places(plan, given, log):
     far = []
     for obstacle in plan.obstacles:
         low, high = (float(np.ravel(end)[-1]) for end in (obstacle.low_m, obstacle.high_m))
-        away = _off_m(obstacle, shell)
+        away = _distance_to_wall_m(obstacle, shell)
         if away > FAR_M or low > max(heights) or high < min(heights):
-            far.append(_told(obstacle.name, away, low, high))
+            far.append(_describe_obstacle(obstacle.name, away, low, high))
     if far:
         text = message(
             "plan_obstacles_far",
@@ -71,7 +71,7 @@ def warn_of_places(plan, given, log):
         _warn_of_tape(plan, entry, log)
 
 
-def _told(name, away_m, low_m, high_m):
+def _describe_obstacle(name, away_m, low_m, high_m):
     return message(
         "plan_obstacle_place",
         "{obstacle} ({away_m:.6g} m from the wall, z {low_m:.6g} to {high_m:.6g} m)",
@@ -82,7 +82,7 @@ def _told(name, away_m, low_m, high_m):
     )
 
 
-def _off_m(obstacle, shell):
+def _distance_to_wall_m(obstacle, shell):
     """Horizontal distance of an obstacle from the wall, m; 0 if it reaches the wall."""
     if isinstance(obstacle, Box):
         low, high = obstacle.low_m[:2], obstacle.high_m[:2]

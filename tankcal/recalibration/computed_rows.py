@@ -121,14 +121,16 @@ def _first_linear_row(volumes, parts):
     for offset in np.argsort(highest_bent, kind="stable"):
         if highest_bent[offset] > (1 - LEAST_PART) * count:
             return None
-        bent = np.any(np.abs(_departures(volumes, int(offset), parts)) > LINEAR + ROUNDING, axis=1)
+        bent = np.any(
+            np.abs(_chord_distances(volumes, int(offset), parts)) > LINEAR + ROUNDING, axis=1
+        )
         above = int(np.flatnonzero(bent)[-1]) + 1 if bent.any() else 0
         if above * parts + offset <= (1 - LEAST_PART) * count:
             return int(above * parts + offset)
     return None
 
 
-def _departures(volumes, first, parts):
+def _chord_distances(volumes, first, parts):
     """Distances (steps, parts - 1) of the rows between computed rows from their chords."""
     steps = (len(volumes) - 1 - first) // parts
     ends = volumes[first : first + steps * parts + 1 : parts]
@@ -145,5 +147,5 @@ def _is_interpolated(volumes, first, parts):
     steps = (len(volumes) - 1 - first) // parts
     rises = np.diff(volumes[first : first + steps * parts + 1]).reshape(steps, parts)
     uneven = np.count_nonzero(np.ptp(rises, axis=1) > 0.5)
-    left = np.abs(_departures(volumes, first, parts))
+    left = np.abs(_chord_distances(volumes, first, parts))
     return bool(uneven >= FEWEST_UNEVEN and left.max() <= INTERPOLATED + ROUNDING)

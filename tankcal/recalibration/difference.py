@@ -59,7 +59,7 @@ def adjust_difference(facts, dips_m, difference_m3, volume_m3, sd_m3, usable):
         Rows outside of critical zones.
     """
     area = slopes_m2(dips_m, volume_m3, sd_m3)
-    columns = _columns(facts, dips_m, volume_m3, area)
+    columns = _derivatives(facts, dips_m, volume_m3, area)
     rows = usable & _above_bottom(facts, dips_m, area)
     reached = (np.abs(columns[rows]) > 1e-9).any(axis=0)
     columns = columns[:, reached]
@@ -91,7 +91,7 @@ def adjust_difference(facts, dips_m, difference_m3, volume_m3, sd_m3, usable):
     )
 
 
-def _columns(facts, dips, volume, area):
+def _derivatives(facts, dips, volume, area):
     """Derivatives (rows, 1 + parts) of the difference by the zero and by the tank dimensions."""
     if facts.is_shell:
         edges = facts.edges_m()

@@ -103,13 +103,13 @@ def find_fittings(dips_m, left_m3, design, sd_m3, longest_m=np.inf, most=4):
             slice(max(high - APART, 0), high + APART + 1),
         )
         likely[near] = 0.0  # the next fitting is well apart
-        low, high = _standing(gain, low, high, slopes[low, high])
+        low, high = _reducing_alternative(gain, low, high, slopes[low, high])
         volume = float(slopes[low, high] * height[low, high])
         fittings.append((Fitting(float(places[low]), float(places[high]), volume), best))
     return fittings
 
 
-def _standing(gain, low, high, slope):
+def _reducing_alternative(gain, low, high, slope):
     """Of the two fittings that may end at one kink, return the one that reduces the volume."""
     last = len(gain) - 1
     if slope > 0:

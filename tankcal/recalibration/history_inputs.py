@@ -120,7 +120,7 @@ def find_files(paths, progress=None):
             if progress is not None:
                 text = message("history_searching", "searching {folder}", folder=str(source))
                 progress(text, 0, 0)
-            for path in _below(source, problems):
+            for path in _files_below(source, problems):
                 files.append((path, len(path.relative_to(source).parts)))
         elif source.is_file():
             files.append((source, 0))
@@ -133,10 +133,10 @@ def find_files(paths, progress=None):
             problems.append(Problem(source.name or str(source), text))
     if problems:
         raise InputError(problems)
-    return _named(files)
+    return _name_files(files)
 
 
-def _named(files):
+def _name_files(files):
     """Return (path, name, whether found in a folder), named with enough folders to be unique.
 
     found: (path, fewest parts of the name, or 0 if not found in a folder) of each file.
@@ -158,7 +158,7 @@ def _count_tails(places, count, known):
     return known[count]
 
 
-def _below(folder, problems):
+def _files_below(folder, problems):
     """Paths of candidate files below a folder; unreadable folders are reported."""
 
     def tell(error):

@@ -24,17 +24,17 @@ _BOUND = 1e-4  # distance from a limit of the form of an end, relative to D, tha
 _STEEP = 1e-6  # relative size below which an unknown is not determined
 
 
-def _tied(kind, depth):
+def _proportional_end(kind, depth):
     """Return an end of fixed proportions, with its depth as a share of the diameter."""
     return lambda diameter, _: End(kind, depth * diameter)
 
 
-def _standard(name):
+def _standard_end(name):
     """Return a torispherical end of a standard form."""
     return lambda diameter, _: standard_end(End("torispherical"), name, diameter)
 
 
-def _free(kind):
+def _free_end(kind):
     """Return an end with an independent depth."""
     return lambda _, depth: End(kind, depth)
 
@@ -42,14 +42,14 @@ def _free(kind):
 # name: (End as a function of D and depth, whether depth is an unknown, start depth over D)
 ENDS = {
     "flat": (lambda *_: End("flat"), False, 0.0),
-    "hemispherical": (_tied("spherical", 0.5), False, 0.5),
-    "ellipsoidal_2_to_1": (_tied("ellipsoidal", 0.25), False, 0.25),
-    "torispherical_din_28011": (_standard("din_28011"), False, 0.19),
-    "torispherical_din_28013": (_standard("din_28013"), False, 0.25),
-    "torispherical_asme": (_standard("asme"), False, 0.17),
-    "spherical": (_free("spherical"), True, 0.15),
-    "ellipsoidal": (_free("ellipsoidal"), True, 0.2),
-    "conical": (_free("conical"), True, 0.15),
+    "hemispherical": (_proportional_end("spherical", 0.5), False, 0.5),
+    "ellipsoidal_2_to_1": (_proportional_end("ellipsoidal", 0.25), False, 0.25),
+    "torispherical_din_28011": (_standard_end("din_28011"), False, 0.19),
+    "torispherical_din_28013": (_standard_end("din_28013"), False, 0.25),
+    "torispherical_asme": (_standard_end("asme"), False, 0.17),
+    "spherical": (_free_end("spherical"), True, 0.15),
+    "ellipsoidal": (_free_end("ellipsoidal"), True, 0.2),
+    "conical": (_free_end("conical"), True, 0.15),
 }
 
 

@@ -133,7 +133,7 @@ def fit_lying(former: FormerTable, dip_from_a_m: float | None = None) -> LyingGe
             fits = leaning
             best, worse = _chosen(fits)
     _refuse_low_rows(former, rows, [fits[name] for name, by in worse.items() if by < TOLD_APART])
-    whole = _again(all_rows, best, dip_from_a_m)
+    whole = _repeat_fit(all_rows, best, dip_from_a_m)
     if whole is None:
         raise SolutionError(no_fit())
     return LyingGeometry(whole, worse, *_tilt(rows, all_rows, best, whole, dip_from_a_m))
@@ -178,7 +178,7 @@ def _chosen(fits):
     return fits[chosen], dict(sorted(worse.items(), key=lambda entry: entry[1]))
 
 
-def _again(rows, fitted, dip_from_a_m):
+def _repeat_fit(rows, fitted, dip_from_a_m):
     """Repeat a fit with other rows; of two mirrored tilts, return the one with the smaller zero."""
     (diameter, length, zero), rest, tilt = fitted.values[:3], fitted.values[3:], None
     if "tilt" in fitted.names:
@@ -202,7 +202,7 @@ def _tilt(rows, all_rows, best, whole, dip_from_a_m):
         return None, 0.0, (0.0, LARGEST_TILT)
     near = min(fits, key=lambda fitted: fitted.chi2)
     level, is_best = fit(near.values, 0.0, True), near is best
-    if not is_best and not _is_told(near, best):
+    if not is_best and not _is_significant(near, best):
         near = best
     limit = near.chi2 + NEAR * near.variance_factor
 
@@ -211,8 +211,8 @@ def _tilt(rows, all_rows, best, whole, dip_from_a_m):
         held = fit(near.values, np.copysign(size, sign), True)
         return held is not None and held.chi2 < limit
 
-    tilted = whole if is_best else _again(all_rows, near, dip_from_a_m)
-    if "tilt" not in near.names or not (is_best or _is_told(tilted, whole)):
+    tilted = whole if is_best else _repeat_fit(all_rows, near, dip_from_a_m)
+    if "tilt" not in near.names or not (is_best or _is_significant(tilted, whole)):
         return None, 0.0, (0.0, _edge(is_near, 0.0, LARGEST_TILT))
     size, u = abs(near["tilt"][0]), near["tilt"][1]
     gain = np.inf if level is None else (level.chi2 - near.chi2) / near.variance_factor
@@ -224,7 +224,7 @@ def _tilt(rows, all_rows, best, whole, dip_from_a_m):
     return tilted, float(gain), sizes
 
 
-def _is_told(leaning, level):
+def _is_significant(leaning, level):
     """Whether a tilt fits better than a level tank, and the rows determine its size."""
     is_there = leaning is not None and leaning.chi2 <= level.chi2
     return is_there and bool(np.isfinite(leaning["tilt"][1]))

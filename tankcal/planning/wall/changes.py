@@ -40,7 +40,7 @@ def _filling(plan):
     def certified(*better):
         return lambda: changed(plan, raw=plan.with_instrument(*better))
 
-    return changes_of_runs(plan, lambda **parts: _made(plan, **parts), certified)
+    return changes_of_runs(plan, lambda **parts: _change_parts(plan, **parts), certified)
 
 
 def wall_count(plan):
@@ -63,7 +63,7 @@ def wall_count(plan):
     }
 
 
-def _made(plan, **parts):
+def _change_parts(plan, **parts):
     return lambda: changed(plan, replace(plan.design, **parts))
 
 
@@ -72,19 +72,19 @@ def _straps(plan):
     for planned in design.straps:
         others = tuple(strap for strap in design.straps if strap is not planned)
         if others or design.hits or design.tangents is not None or design.runs:
-            yield "drop", "strap", planned.name, _made(plan, straps=others)
+            yield "drop", "strap", planned.name, _change_parts(plan, straps=others)
         if planned.readings < MOST_READINGS:
             again = replace(planned, readings=planned.readings + 1)
             straps = tuple(again if strap is planned else strap for strap in design.straps)
-            yield "repeat", "strap", planned.name, _made(plan, straps=straps)
+            yield "repeat", "strap", planned.name, _change_parts(plan, straps=straps)
     if not design.straps:
         return
     for course in plan.job.courses:
         taken = [strap.at_percent for strap in design.straps if strap.course == course.name]
         added = replace(design.straps[0], course=course.name, at_percent=between(taken), readings=1)
-        yield "add", "strap", added.name, _made(plan, straps=(*design.straps, added))
+        yield "add", "strap", added.name, _change_parts(plan, straps=(*design.straps, added))
     finer = tuple(replace(strap, sd_mm=strap.sd_mm / 2) for strap in design.straps)
-    yield "repeat", "accuracy", "straps", _made(plan, straps=finer)
+    yield "repeat", "accuracy", "straps", _change_parts(plan, straps=finer)
 
 
 def between(heights):
@@ -106,18 +106,18 @@ def _lines(plan):
     if lines is None:
         return
     count = lines.count + MORE_LINES
-    yield "add", "line", str(MORE_LINES), _made(plan, lines=replace(lines, count=count))
+    yield "add", "line", str(MORE_LINES), _change_parts(plan, lines=replace(lines, count=count))
     if lines.count - MORE_LINES >= FEWEST_LINES:
         fewer = replace(lines, count=lines.count - MORE_LINES)
-        yield "drop", "line", str(MORE_LINES), _made(plan, lines=fewer)
+        yield "drop", "line", str(MORE_LINES), _change_parts(plan, lines=fewer)
     other_faces = MOST_FACES + 1 - lines.faces
     action = "add" if other_faces == MOST_FACES else "drop"
-    yield action, "face", "2", _made(plan, lines=replace(lines, faces=other_faces))
+    yield action, "face", "2", _change_parts(plan, lines=replace(lines, faces=other_faces))
     if lines.readings < MOST_READINGS:
         again = replace(lines, readings=lines.readings + 1)
-        yield "repeat", "reading", "offsets", _made(plan, lines=again)
+        yield "repeat", "reading", "offsets", _change_parts(plan, lines=again)
     for action, name, at in _levels(lines.at_percent):
-        yield action, "level", name, _made(plan, lines=replace(lines, at_percent=at))
+        yield action, "level", name, _change_parts(plan, lines=replace(lines, at_percent=at))
 
 
 def _levels(at_percent):
@@ -134,7 +134,7 @@ def _hits(plan):
 
         def made(ring=ring, **parts):
             rings = tuple(replace(hits, **parts) if hits is ring else hits for hits in design.hits)
-            return _made(plan, hits=rings)
+            return _change_parts(plan, hits=rings)
 
         yield "add", "hit", str(number), made(hits=ring.hits + max(1, ring.hits // 2))
         if ring.hits // 2 >= 1:
@@ -158,7 +158,7 @@ def _first_straps(plan):
         straps = tuple(
             PlannedStrap(first, at, 0.5, more=(("instrument", names[-1]),)) for at in USUAL_AT
         )
-        yield "add", "strap", f"{first}-20, {first}-80", _made(plan, straps=straps)
+        yield "add", "strap", f"{first}-20, {first}-80", _change_parts(plan, straps=straps)
 
 
 def _tangents(plan):
@@ -167,7 +167,7 @@ def _tangents(plan):
         return
 
     def made(**parts):
-        return _made(plan, tangents=replace(ring, **parts))
+        return _change_parts(plan, tangents=replace(ring, **parts))
 
     for action, count in (("add", ring.stations + 1), ("drop", ring.stations - 1)):
         if count >= FEWEST_SETUPS:
