@@ -15,8 +15,8 @@ SHAPED = tuple(TIPS)
 KEYS = (
     choice(
         "form",
-        "form of the bottom; cloud: as scans from inside show it; blank: flat, or points or liquid"
-        " when bottom.csv has their columns",
+        "form of the bottom; cloud: from scans of the inside; blank: points or liquid if"
+        " bottom.csv has their columns, else flat",
         ("flat", "leaning", *SHAPED, "points", "liquid", OF_CLOUD),
         kinds=VERTICAL,
     ),
@@ -42,9 +42,16 @@ COLUMNS = (
     _bottom("y_m", "surveyed bottom: coordinate y, in the frame of the points, metres", -1e8, 1e8),
     _bottom("z_m", "surveyed bottom: coordinate z, in the frame of the points, metres", -1e5, 1e5),
     _bottom("s_mm", "surveyed bottom: standard deviation of z, millimetres", 0, 1000, True),
-    _bottom("level_m", "or measured by liquid: dip from the table's zero, metres", -100, 100),
-    _bottom("volume_m3", "measured by liquid: volume below that dip, cubic metres", 0, 1e6),
-    _bottom("u_m3", "measured by liquid: its standard uncertainty, cubic metres", 0, 1e5),
+    _bottom("level_m", "bottom measured with liquid: dip from the table's zero, metres", -100, 100),
+    _bottom(
+        "volume_m3", "bottom measured with liquid: volume below that dip, cubic metres", 0, 1e6
+    ),
+    _bottom(
+        "u_m3",
+        "bottom measured with liquid: standard uncertainty of the volume, cubic metres",
+        0,
+        1e5,
+    ),
 )
 
 SURVEYED, MEASURED = ("x_m", "y_m", "z_m"), ("level_m", "volume_m3")
@@ -87,7 +94,7 @@ def check_bottom(values, table, points, extent, raw, log):
     if not has_rows(table):
         expected = message(
             "bottom_rows_missing",
-            "no rows; expected {wanted}, as bottom.form = {form} says",
+            "no rows; expected {wanted} for bottom.form = {form}",
             wanted=[*wanted],
             form=form,
         )
@@ -237,7 +244,7 @@ def _refuse_same_places(table, xyz, log):
         if place in first_row:
             expected = message(
                 "bottom_point_twice",
-                "the same x and y as row {first_row}; expected one point there",
+                "x and y of row {first_row} again; expected one point at each place",
                 first_row=first_row[place],
             )
             log.problem(table.file, expected, row, "x_m")

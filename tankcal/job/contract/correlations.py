@@ -10,8 +10,8 @@ CORRELATED = tuple(name for name, one in INPUTS.items() if one.correlates)
 
 COLUMNS = (
     choice("input", "an input of uncertainty.csv", CORRELATED, required=True),
-    choice("with", "another one, correlated with it", CORRELATED, required=True),
-    number("r", "their coefficient of correlation", -1, 1, required=True),
+    choice("with", "another input, correlated with the first", CORRELATED, required=True),
+    number("r", "coefficient of correlation of the two inputs", -1, 1, required=True),
 )
 
 

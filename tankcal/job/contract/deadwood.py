@@ -9,25 +9,30 @@ from tankcal.job.plausibility import GIVES_ROOM, TAKES_ROOM
 from tankcal.messages import message
 
 COLUMNS = (
-    Field("name", "name", "name of the thing, once in the file", required=True),
+    Field("name", "name", "name of the item, unique in the file", required=True),
     number(
         "bottom_m",
-        "dip of its lowest point, from the table's zero, metres",
+        "dip of the lowest point of the item, from the table's zero, metres",
         -100,
         100,
         required=True,
     ),
     number(
-        "top_m", "dip of its highest point, from the table's zero, metres", -100, 100, required=True
+        "top_m",
+        "dip of the highest point of the item, from the table's zero, metres",
+        -100,
+        100,
+        required=True,
     ),
     number(
         "volume_m3",
-        "its volume, cubic metres: negative takes room (a pipe), positive gives room (a manhole)",
+        "volume of the item, cubic metres: negative if it reduces the capacity (a pipe),"
+        " positive if it adds to it (a manhole)",
         -1e6,
         1e6,
         required=True,
     ),
-    number("u_m3", "standard uncertainty of its volume, cubic metres", 0, 1e5),
+    number("u_m3", "standard uncertainty of the volume, cubic metres", 0, 1e5),
 )
 
 TOLERANCE_M = 0.05  # by which a thing may stick out of the drawing's tank
@@ -76,23 +81,23 @@ def _check_sign(table, row, name, volume, log):
     if volume > 0 and takes and not gives:
         text = message(
             "deadwood_takes",
-            "{volume_m3:+g} m3 adds to the capacity, but {name} takes up room: expected a "
-            "negative volume",
+            "{volume_m3:+g} m3 adds to the capacity, but {name} reduces it: expected a negative"
+            " volume",
             **values,
         )
     elif volume > 0 and not gives:
         text = message(
             "deadwood_sign_unsaid",
-            "{volume_m3:+g} m3 adds to the capacity, and the name {name} does not show how: "
-            "expected a negative volume for what stands in the tank, or the name of what "
-            "adds room, such as manhole or sump",
+            "{volume_m3:+g} m3 adds to the capacity, but {name} is no known name of an added"
+            " space: expected a negative volume for an object in the tank, or a name such as"
+            " manhole or sump",
             **values,
         )
     elif volume < 0 and gives:
         text = message(
             "deadwood_gives",
-            "{volume_m3:+g} m3 reduces the capacity, but {name} adds room: expected a "
-            "positive volume",
+            "{volume_m3:+g} m3 reduces the capacity, but {name} adds to it: expected a positive"
+            " volume",
             **values,
         )
     else:

@@ -19,7 +19,7 @@ def end_keys(letter):
         choice(f"end_{letter}", f"form of {name}", KINDS, required=True, kinds=HORIZONTAL_ONLY),
         positive(
             f"end_{letter}_depth_m",
-            f"{name}: depth along the axis, metres; not of flat ends",
+            f"{name}: depth along the axis, metres; blank for flat ends",
             20,
             kinds=HORIZONTAL_ONLY,
         ),
@@ -54,7 +54,7 @@ def torispherical_keys(prefix, name, kinds):
         ),
         choice(
             f"{prefix}standard",
-            f"{name}standard that both radii follow from by the diameter; torispherical only",
+            f"{name}standard that defines both radii from the diameter; torispherical only",
             tuple(STANDARDS),
             kinds=kinds,
         ),
@@ -75,7 +75,7 @@ def check_end(given, end, has_points, raw, log):
     if form in ROUND_ONLY and None not in (height, width) and height != width:
         expected = message(
             "round_ends_only",
-            "found {form}; expected another form: this one is for round cylinders only",
+            "found {form}, an end for round cylinders only; expected another form",
             form=form,
         )
         tell_problem(end, expected)
@@ -84,7 +84,7 @@ def check_end(given, end, has_points, raw, log):
     if depth is not None and form == "flat":
         expected = message(
             "end_has_no_depth",
-            "given for a {form} end; expected a blank: such an end has no depth",
+            "given for a {form} end, which has no depth; expected a blank",
             form=form,
         )
         tell_problem(key, expected)
@@ -140,7 +140,7 @@ def check_radii(section, given, form, depth_key, depth, diameter, raw, log, *, p
             if given[key] is not None:
                 expected = message(
                     "end_radius_unused",
-                    "given for a {form} end; expected only for a torispherical one",
+                    "given for a {form} end; expected only for a torispherical end",
                     form=form,
                 )
                 tell(log.problem, raw, section, key, expected)

@@ -28,21 +28,21 @@ OVERRULINGS = (
     Field(
         "point",
         "name",
-        "a point of the wall as points.csv or targets.csv names it; of a sight to the wall its"
-        " set-up, a blank and its row, such as S1 14; blank: a reading",
+        "point of the wall, as named in points.csv or targets.csv; for a sight to the wall its"
+        " set-up, a space and its row, such as S1 14; blank for a reading",
     ),
-    choice("table", "in place of a point: the table of a reading of the survey", READINGS),
-    number("row", "of that reading: its row in that table, as messages count it", 2, 1e7),
+    choice("table", "in place of a point: table of a reading of the survey", READINGS),
+    number("row", "row of that reading in its table, as numbered in messages", 2, 1e7),
     choice(
         "decision",
-        "keep: it stays, whatever the search for blunders says; leave_out: it is taken out before"
-        " the search",
+        "keep: not rejected, whatever the result of the outlier test; leave_out: removed before"
+        " the outlier test",
         DECISIONS,
         required=True,
     ),
-    Field("reason", "text", "why; the certificate states it", required=True),
-    Field("by", "text", "who decided"),
-    Field("date", "date", "when it was decided"),
+    Field("reason", "text", "reason for the decision; stated on the certificate", required=True),
+    Field("by", "text", "person who decided"),
+    Field("date", "date", "date of the decision"),
 )
 COLUMNS = {"overrulings": OVERRULINGS}
 
@@ -56,7 +56,7 @@ def check_overrulings(table, tables, is_whole, log):
     if len(table.rows) > MOST:
         expected = message(
             "overrulings_too_many",
-            "{count} rows; expected at most {most}: this is no longer overruling a search",
+            "{count} rows; expected at most {most} decisions that overrule the outlier test",
             count=len(table.rows),
             most=MOST,
         )
@@ -142,15 +142,15 @@ def _check_point(table, row, point, known, log):
         return
     expected = message(
         "overruled_unknown",
-        "found {point!r}; expected a point of the wall: one of points.csv or targets.csv, or a"
-        " set-up, a blank and the row of its sight",
+        "found {point!r}; expected a point of points.csv or targets.csv, or for a sight its"
+        " set-up, a space and its row",
         point=point,
     )
     if not known:
         expected = message(
             "overruled_nameless",
-            "found {point!r}; this job has no points of the wall with names: what a tape, a line of"
-            " sight, a cloud or liquid read cannot be overruled",
+            "found {point!r}, but this job has no named points of the wall; readings of tapes,"
+            " reference lines, clouds and liquid cannot be overruled",
             point=point,
         )
     log.problem(table.file, expected, row, "point")
@@ -174,8 +174,8 @@ def _check_reading(table, row, of, number_of, tables, log):
     elif _is_correlated(tables["correlated_readings"], of, number_of):
         expected = message(
             "overruled_correlated",
-            "row {number} of {file} is correlated with another value; expected a reading of its"
-            " own: take the pair out of correlated_readings first",
+            "row {number} of {file} is correlated with another value; expected an uncorrelated"
+            " reading: remove the pair from correlated_readings first",
             number=number_of,
             file=readings.file,
         )
@@ -185,7 +185,8 @@ def _check_reading(table, row, of, number_of, tables, log):
         if use == "check":
             expected = message(
                 "overruled_check",
-                "row {number} of {file} is only compared (use = check): there is nothing to decide",
+                "row {number} of {file} is only compared (use = check); expected an adjusted"
+                " reading",
                 number=number_of,
                 file=readings.file,
             )

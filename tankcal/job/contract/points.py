@@ -21,7 +21,7 @@ def _coordinate(axis, limit):
 
 
 COLUMNS = (
-    Field("point", "name", "name of the point, once in the file", required=True),
+    Field("point", "name", "name of the point, unique in the file", required=True),
     _coordinate("x", 1e8),
     _coordinate("y", 1e8),
     _coordinate("z", 1e5),
@@ -47,8 +47,8 @@ def check_points(points, log):
     if len(points.rows) > MAX_POINTS:
         expected = message(
             "points_too_many",
-            "{count} points; expected at most {most}, for the record keeps each of them: hand a"
-            " larger scan in as its files (clouds.toml), of which any number is read",
+            "{count} points; expected at most {most}, because the record contains every point:"
+            " declare the files of a larger scan in clouds.toml",
             count=len(points.rows),
             most=MAX_POINTS,
         )
@@ -82,7 +82,7 @@ def _warn_same_places(points, log):
         if place in first_row:
             expected = message(
                 "same_coordinates",
-                "the same coordinates as row {row}; counted once",
+                "coordinates of row {row} again; counted once",
                 row=first_row[place],
             )
             log.warning(points.file, expected, row, "x_m")

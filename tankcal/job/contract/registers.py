@@ -34,10 +34,10 @@ _NOTES = {
     "c": "principal distance, millimetres",
     "x0": "principal point, to the right of the middle of the format, millimetres",
     "y0": "principal point, above the middle of the format, millimetres",
-    "A": "affinity, in the form of the key affinity",
-    "B": "affinity, in the form of the key affinity",
-    "b1": "in place of A, of the form b1_b2",
-    "b2": "in place of B, of the form b1_b2",
+    "A": "affinity, in the form set by the key affinity",
+    "B": "affinity, in the form set by the key affinity",
+    "b1": "affinity in place of A, for the form b1_b2",
+    "b2": "affinity in place of B, for the form b1_b2",
 }
 
 
@@ -66,7 +66,7 @@ def sd_key(name):
 
 
 def _sd(name, of=None):
-    note = f"standard deviation of {name}, in the unit of its value; 0: held"
+    note = f"standard deviation of {name}, in the unit of the parameter; 0: held fixed"
     return Field(sd_key(name), "number", note, low=0, high=PARAMETER_KEYS[of or name][1])
 
 
@@ -79,7 +79,7 @@ FAMILIES = {
         MARKS: Field(
             MARKS,
             "numbers",
-            "calibrated place of a fiducial mark, millimetres from the middle: [-83.01, 0.02]",
+            "calibrated position of a fiducial mark, millimetres from the middle: [-83.01, 0.02]",
             low=-1e3,
             high=1e3,
         )
@@ -89,7 +89,7 @@ _FOCUS = (
     Field(
         "focus_m",
         "number",
-        "distance that the lens is focused at, metres; with focus_calibrations, in place of K",
+        "focus distance of the lens, metres; with focus_calibrations, in place of K",
         low=0,
         above_low=True,
         high=1e9,
@@ -133,7 +133,7 @@ CAMERA = (
     Field(
         "format_px",
         "numbers",
-        "or columns and lines of the image, with pixel_um: [6000, 4000]",
+        "in place of format_mm: columns and lines of the image, with pixel_um: [6000, 4000]",
         low=0,
         above_low=True,
         high=1e6,
@@ -160,21 +160,21 @@ CAMERA = (
     Field(
         "radial_balance_mm",
         "number",
-        "radius without radial distortion, of the balanced form, millimetres; blank: 0",
+        "radius of zero radial distortion, of the balanced form, millimetres; blank: 0",
         low=0,
         high=1000,
     ),
     Field(
         "convention",
         "choice",
-        "what K and P do: correction_added, correction_subtracted or distortion_of_ideal; needed"
-        " with any of them",
+        "sign convention of K and P: correction_added, correction_subtracted or"
+        " distortion_of_ideal; needed with any K or P",
         choices=tuple(CONVENTIONS),
     ),
     Field(
         "fiducial_transformation",
         "choice",
-        "of comparator readings through the marks in fiducials.csv; blank: affine",
+        "transformation of comparator readings with the marks in fiducials.csv; blank: affine",
         choices=tuple(TRANSFORMATIONS),
     ),
     *_FOCUS,
@@ -183,22 +183,22 @@ INSTRUMENT = (
     Field(
         "kind",
         "text",
-        f"{', '.join(INSTRUMENT_KINDS)}, or another one",
+        f"{', '.join(INSTRUMENT_KINDS)}, or another kind",
         required=True,
         choices=INSTRUMENT_KINDS,
     ),
-    Field("certificate", "text", "number of its certificate; printed when given"),
+    Field("certificate", "text", "number of the instrument's certificate; printed if given"),
     Field(
         "certified_temperature_c",
         "number",
-        "temperature that the certificate is for, degrees Celsius",
+        "reference temperature of the certificate, degrees Celsius",
         low=-60,
         high=90,
     ),
     Field(
         "tension_n",
         "number",
-        "pull that the certificate of a tape is for, newtons",
+        "tension stated in the certificate of a tape, newtons",
         low=0,
         high=1000,
     ),
@@ -206,21 +206,21 @@ INSTRUMENT = (
     Field(
         "correction",
         "number",
-        "of the scale: true = reading (1 + correction); blank: 0",
+        "correction of the scale: true = reading (1 + correction); blank: 0",
         low=-0.1,
         high=0.1,
     ),
     Field(
         "correction_mm",
         "number",
-        "added to each reading, millimetres; blank: 0",
+        "correction added to each reading, millimetres; blank: 0",
         low=-1e4,
         high=1e4,
     ),
     Field(
         "u_scale_ppm",
         "number",
-        "standard uncertainty of the scale, ppm; free: an unknown; blank: 0",
+        "standard uncertainty of the scale, ppm; free: estimated as an unknown; blank: 0",
         low=0,
         high=1e5,
         choices=(FREE,),
@@ -228,7 +228,7 @@ INSTRUMENT = (
     Field(
         "u_offset_mm",
         "number",
-        "standard uncertainty of the offset, millimetres; free: an unknown; blank: 0",
+        "standard uncertainty of the offset, millimetres; free: estimated as an unknown; blank: 0",
         low=0,
         high=1e4,
         choices=(FREE,),
@@ -245,7 +245,9 @@ def _override(name, note):
 
 
 CAMERA_SETTINGS = (
-    _override("default", "of c x0 y0 K1 K2 K3 P1 P2 and the affinity; blank: camera free"),
+    _override(
+        "default", "scope and state of c x0 y0 K1 K2 K3 P1 P2 and the affinity; blank: camera free"
+    ),
     *(_override(name, _note(name)) for name in PARAMETER_KEYS),
     *(_override(key, _note(key)) for key in SECOND_NAMES.values()),
 )

@@ -14,14 +14,15 @@ RINGS = (
     positive("length_m", "length of the ring along the axis, metres", 50, required=True),
     number(
         "thickness_mm",
-        "plate thickness, millimetres; blank: as the readings of the table thickness say",
+        "plate thickness, millimetres; blank: mean of the readings in the table thickness",
         0,
         100,
     ),
     number("paint_mm", "thickness of the paint, millimetres; blank: 0", 0, 10),
     choice(
         "lap",
-        "of lap-jointed rings: inner or outer, for all of them; only compared; blank: not known",
+        "lap of lap-jointed rings: inner or outer, for all rings or for none; only compared;"
+        " blank: not known",
         LAPS,
         in_full=True,
     ),
@@ -53,8 +54,8 @@ def check_rings_alone(rings, gauged, values, log):
         if thickness is None and name not in gauged:
             expected = message(
                 "ring_without_plate",
-                "blank; expected the plate's thickness: the tape lay outside, and no reading of a"
-                " gauge says it",
+                "blank; expected the plate's thickness: the tape was outside, and the table"
+                " thickness has no reading of this ring",
             )
             log.problem(rings.file, expected, row, "thickness_mm")
         elif thickness is not None and 0 < thickness < SMALLEST_THICKNESS_MM:
@@ -65,8 +66,7 @@ def check_rings_alone(rings, gauged, values, log):
     if None not in laps and any(one == other for one, other in pairwise(laps)):
         expected = message(
             "laps_not_in_turn",
-            "rings that touch are both inner, or both outer: lap-jointed rings are inner and outer"
-            " in turn",
+            "adjacent rings are both inner, or both outer; lap-jointed rings alternate",
         )
         log.warning(rings.file, expected, None, "lap")
 

@@ -9,33 +9,34 @@ from tankcal.messages import message
 KEYS = (
     positive(
         "mass_kg",
-        "floating roof: its mass with all that floats with it, kilograms; blank: no floating roof",
+        "floating roof: mass of the roof and all that floats with it, kilograms; blank: no"
+        " floating roof",
         1e7,
         kinds=VERTICAL,
     ),
     number(
         "critical_bottom_m",
-        "dip at which the liquid first touches it, from the table's zero, metres",
+        "dip at which the liquid first touches the roof, from the table's zero, metres",
         0,
         100,
         kinds=VERTICAL,
     ),
     number(
         "critical_top_m",
-        "dip at which it floats freely, from the table's zero, metres",
+        "dip at which the roof floats freely, from the table's zero, metres",
         0,
         100,
         kinds=VERTICAL,
     ),
     positive(
         "reference_density_kg_m3",
-        "density of the liquid that the table is for, kg/m3",
+        "density of the liquid for the table, kg/m3",
         3000,
         kinds=VERTICAL,
     ),
     choice(
         "weighing",
-        "what the mass was weighed in, or reduced to: air or vacuum",
+        "mass as weighed in, or reduced to, air or vacuum",
         ("air", "vacuum"),
         kinds=VERTICAL,
     ),

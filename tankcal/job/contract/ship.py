@@ -21,8 +21,8 @@ def _several(name, note, high):
 KEYS = (
     _several(
         "trim_m",
-        "trims that corrections are tabled for, draught aft less draught forward, metres; negative:"
-        " by the bow; blank, as all of [ship]: not a tank of a ship",
+        "trims of the correction tables, draught aft minus draught forward, metres; negative:"
+        " by the bow; blank, like all of [ship]: not a tank of a ship",
         30,
     ),
     positive(
@@ -33,7 +33,7 @@ KEYS = (
     ),
     _several(
         "list_deg",
-        "lists that corrections are tabled for, degrees; to starboard positive, to port negative",
+        "lists of the correction tables, degrees; positive to starboard, negative to port",
         45,
     ),
     number(
@@ -50,21 +50,21 @@ KEYS = (
     ),
     _several(
         "pipe_bottom_m",
-        "lower end of the sounding pipe, which soundings count from: x; y; z in the frame of the"
+        "lower end of the sounding pipe, the zero of the soundings: x; y; z in the frame of the"
         " mesh, metres",
         1e8,
     ),
     positive(
         "correction_step_m",
-        "step of the soundings that corrections are tabled for, metres; blank: chosen, about a"
+        "step of the soundings in the correction tables, metres; blank: chosen for about a"
         " hundred soundings",
         10,
         kinds=MESH_ONLY,
     ),
     number(
         "contraction_percent",
-        "how much all lengths of the tank are shorter in service than as measured, percent, the"
-        " same everywhere; blank: not at all",
+        "uniform contraction of all lengths of the tank in service, relative to the survey,"
+        " percent; blank: 0",
         -1,
         2,
         kinds=MESH_ONLY,
@@ -191,13 +191,15 @@ def _refuse_others(values, tables, log, refuse):
     if has_rows(tables["deadwood"]):
         expected = message(
             "ship_deadwood",
-            "given beside [ship]; expected what stands in the tank as a hollow of the mesh: of "
-            "deadwood by dips nobody knows where it is",
+            "given beside [ship]; expected objects in the tank as cavities of the mesh:"
+            " deadwood given by dips has no horizontal position",
         )
         log.problem(tables["deadwood"].file, expected)
     if has_rows(tables["liquid"]):
         expected = message(
-            "ship_liquid", "given beside [ship]; expected only one of them: runs know no pipe"
+            "ship_liquid",
+            "given beside [ship]; expected only one of them: metered runs do not"
+            " use a sounding pipe",
         )
         log.problem(tables["liquid"].file, expected)
     contracted = values["ship"]["contraction_percent"] is not None

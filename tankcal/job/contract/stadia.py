@@ -5,14 +5,14 @@ from tankcal.job.fields import Field
 
 LEAST = 3e-4  # of a turn: 2 m at 1 km; a bar farther away tells no distance
 STADIA = (
-    Field("setup", "name", "the set-up that reads it, as in setups.csv", required=True),
-    Field("to", "name", "the station that the middle of the bar stands over", required=True),
-    Field("bar", "name", "stadia of instruments.toml; blank: the only one there"),
+    Field("setup", "name", "set-up of setups.csv from which the bar was read", required=True),
+    Field("to", "name", "station under the middle of the bar", required=True),
+    Field("bar", "name", "stadia of instruments.toml; blank: the only stadia there"),
     *angle_fields("angle", "horizontal angle between the ends of the bar", (LEAST, 0.25)),
     Field(
         "s_arcsec",
         "number",
-        "standard deviation of that angle, seconds of arc",
+        "standard deviation of the angle, seconds of arc",
         required=True,
         low=0,
         high=1e4,
@@ -33,7 +33,7 @@ BAR = (  # keys of instruments.toml
     Field(
         "u_mm",
         "number",
-        "standard uncertainty of that distance, millimetres",
+        "standard uncertainty of length_m, millimetres",
         low=0,
         high=100,
     ),

@@ -8,20 +8,18 @@ from tankcal.messages import message
 COLUMNS = (
     positive(
         "high_m",
-        "dip from the table's zero, metres: its volume is reported with uncertainty and budget",
+        "dip from the table's zero, metres; the report states its volume, uncertainty and budget",
         100,
         required=True,
     ),
-    number(
-        "low_m", "of a delivery: the dip it ends at, metres; blank: the volume below high_m", 0, 100
-    ),
+    number("low_m", "for a delivery: dip at its end, metres; blank: volume below high_m", 0, 100),
     positive(
         "volume_m3",
-        "volume that an earlier table or a contract states there, cubic metres, for a decision"
-        " rule that limits deviations",
+        "volume stated by an earlier table or a contract, cubic metres; for decision rules that"
+        " limit deviations",
         1e6,
     ),
-    Field("note", "text", "what it is"),
+    Field("note", "text", "description of the volume"),
 )
 
 _ROUNDING_M = 1e-9

@@ -16,14 +16,14 @@ from tankcal.messages import message
 KEYS = (
     choice(
         "form",
-        "head on top of the shell, which liquid may rise into: cone, dish, ellipsoidal or"
-        " torispherical; blank: the table ends with the shell",
+        "head on top of the shell, which the liquid may enter: cone, dish, ellipsoidal or"
+        " torispherical; blank: the table ends at the top of the shell",
         SHAPED,
         kinds=VERTICAL,
     ),
     positive(
         "depth_m",
-        "rise of its middle over the top of the last course, inside, metres",
+        "inside height of the head above the top of the last course, metres",
         100,
         kinds=VERTICAL,
     ),
@@ -54,8 +54,8 @@ def check_top(values, is_metered, raw, log):
     if is_metered:
         expected = message(
             "top_beside_liquid",
-            "given together with liquid.csv; expected a blank: metered runs tell the shell, and its"
-            " table ends with it",
+            "given together with liquid.csv; expected a blank: metered runs calibrate only the"
+            " shell, and the table ends at its top",
         )
         tell(log.problem, raw, "top", "form", expected)
     if form != "torispherical" and is_not_given(raw, "top", "depth_m"):

@@ -68,33 +68,33 @@ INPUTS = {
         "mm",
         1e3,
         100,
-        "offset of instrument or target square to the wall, the same for all points",
+        "offset of instrument or target perpendicular to the wall, common to all points",
         WITH_POINTS,
     ),
-    "datum": Declarable("mm", 1e3, 100, "height of the table's zero against the tank"),
+    "datum": Declarable("mm", 1e3, 100, "height of the table's zero relative to the tank"),
     "course_heights": _of_shell(
         "mm", 1e3, 100, "height of each course, independent of the others", correlates=False
     ),
     "plate_thickness": Declarable(
-        "mm", 1e3, 10, "plate thickness, the same error everywhere", WITH_POINTS, default=0.2
+        "mm", 1e3, 10, "plate thickness, error common to all plates", WITH_POINTS, default=0.2
     ),
     "paint": Declarable(
-        "mm", 1e3, 5, "paint thickness, the same error in all courses", STRAPPED, default=0.05
+        "mm", 1e3, 5, "paint thickness, error common to all courses", STRAPPED, default=0.05
     ),
     "shell_temperature": Declarable("K", 1, 50, "shell temperature during the survey", default=2.0),
     "expansion": Declarable("1/K", 1, 1e-4, "coefficient of thermal expansion", default=1e-6),
     "youngs_modulus": Declarable(
         "GPa", 1e-9, 100, "Young's modulus of the shell", LOADED, default=6.0
     ),
-    "liquid_density": Declarable(
-        "kg/m3", 1, 500, "density of the liquid that the table is for", LOADED
-    ),
+    "liquid_density": Declarable("kg/m3", 1, 500, "density of the liquid for the table", LOADED),
     "survey_level": Declarable(
         "mm", 1e3, 1000, "level of the liquid on the survey day", LOADED, default=5.0
     ),
-    "survey_density": Declarable("kg/m3", 1, 500, "density of that liquid", LOADED, default=5.0),
+    "survey_density": Declarable(
+        "kg/m3", 1, 500, "density of the liquid on the survey day", LOADED, default=5.0
+    ),
     "pressure": Declarable(
-        "bar", 1e-5, 10, "gauge pressure in the sphere that the table is for", ("sphere",)
+        "bar", 1e-5, 10, "gauge pressure in the sphere for the table", ("sphere",)
     ),
     "survey_pressure": Declarable(
         "bar",
@@ -104,52 +104,53 @@ INPUTS = {
         ("sphere",),
         default=0.1,
     ),
-    "bottom": _of_shell(
-        "mm", 1e3, 500, "height of the bottom's surface, the same error everywhere"
-    ),
-    "barrel": _of_shell("mm", 1e3, 100, "how far a course bulges between its sections"),
+    "bottom": _of_shell("mm", 1e3, 500, "height of the bottom surface, error common to all of it"),
+    "barrel": _of_shell("mm", 1e3, 100, "bulge of a course between its sections"),
     "taper": _of_shell(
-        "mm", 1e3, 100, "how far one end of a course is wider than its middle, the same in all"
+        "mm",
+        1e3,
+        100,
+        "excess of the radius at one end of a course over its middle, common to all courses",
     ),
     "roof_mass": _of_shell("kg", 1, 1e6, "mass of the floating roof", default_share=0.01),
     "deadwood": Declarable(
         "%",
         100,
         50,
-        "volume of the deadwood without u_m3 of its own, the same relative error",
+        "volume of the deadwood without u_m3, common relative error",
         default=5.0,
     ),
     "diameter": Declarable(
         "mm", 1e3, 200, "diameter of the cylinder or sphere", ("horizontal", "sphere")
     ),
     "length": _of_lying("mm", 1e3, 500, "length of the horizontal cylinder"),
-    "end_depth": _of_lying("mm", 1e3, 500, "depth of both ends, the same error"),
+    "end_depth": _of_lying("mm", 1e3, 500, "depth of both ends, common error"),
     "dish": Declarable(
         "mm",
         1e3,
         500,
-        "radius of the dish of torispherical ends and heads, where it is given, the same error",
+        "radius of the dish of torispherical ends and heads, where given, common error",
         ("vertical", "horizontal"),
     ),
     "knuckle": Declarable(
         "mm",
         1e3,
         200,
-        "radius of the knuckle of torispherical ends and heads, where it is given, the same error",
+        "radius of the knuckle of torispherical ends and heads, where given, common error",
         ("vertical", "horizontal"),
     ),
     "bottom_depth": _of_shell(
-        "mm", 1e3, 500, "depth of a shaped bottom from its edge to its middle"
+        "mm", 1e3, 500, "depth of a shaped bottom from its edge to its centre"
     ),
-    "top_depth": _of_shell("mm", 1e3, 500, "rise of the head on top over the shell"),
+    "top_depth": _of_shell("mm", 1e3, 500, "height of the head above the shell"),
     "tilt": Declarable(
         "mm/m",
         1e3,
         50,
-        "tilt of the axis; of a vertical tank such as settlement since the survey",
+        "tilt of the axis; for a vertical tank such as settlement since the survey",
         ("vertical", "horizontal"),
     ),
-    "dip_position": _of_lying("mm", 1e3, 2000, "place of the dip point along the axis"),
+    "dip_position": _of_lying("mm", 1e3, 2000, "position of the dip point along the axis"),
     "ring_lengths": _of_lying(
         "mm", 1e3, 100, "length of each ring, independent of the others", correlates=False
     ),
@@ -157,33 +158,33 @@ INPUTS = {
         "mm",
         1e3,
         50,
-        "how far the axis of each ring stands above the common one, independent of the others",
+        "height of the axis of each ring above the common axis, independent of the others",
         correlates=False,
     ),
-    "tube_angle": _of_lying("deg", 180 / pi, 10, "angle of the gauge tube off the plumb"),
-    "tube_offset": _of_lying("mm", 1e3, 500, "place of the gauge tube across the axis"),
+    "tube_angle": _of_lying("deg", 180 / pi, 10, "angle of the gauge tube from the vertical"),
+    "tube_offset": _of_lying("mm", 1e3, 500, "position of the gauge tube across the axis"),
     "surface": Declarable("mm", 1e3, 200, "offset of the mesh's surface from the wall", ("mesh",)),
-    "trim": _of_ship("mm", 1e3, 1000, "trim of a ship: draught aft less draught forward"),
+    "trim": _of_ship("mm", 1e3, 1000, "trim of a ship: draught aft minus draught forward"),
     "list": _of_ship("deg", degrees(1), 5, "list of a ship"),
-    "pipe_x": _of_ship("mm", 1e3, 1000, "place of the sounding pipe fore and aft"),
-    "pipe_y": _of_ship("mm", 1e3, 1000, "place of the sounding pipe athwart"),
+    "pipe_x": _of_ship("mm", 1e3, 1000, "position of the sounding pipe fore and aft"),
+    "pipe_y": _of_ship("mm", 1e3, 1000, "position of the sounding pipe athwart"),
     "pipe_lean": _of_ship(
         "mm/m", 1e3, 50, "lean of the sounding pipe, fore and aft and athwart", correlates=False
     ),
     "contraction": _of_ship("%", 100, 0.5, "uniform contraction of all lengths"),
     "interpolation": Declarable(
-        "m3", 1, 100, "straight line between two rows, of each reading", correlates=False
+        "m3", 1, 100, "linear interpolation between two rows, for each reading", correlates=False
     ),
     "rounding": Declarable(
-        "m3", 1, 10, "last digit of a printed volume, of each reading", correlates=False
+        "m3", 1, 10, "last digit of a printed volume, for each reading", correlates=False
     ),
 }
 UNITS = tuple(dict.fromkeys(one.unit for one in INPUTS.values()))
 
 COLUMNS = (
-    choice("input", "what is uncertain: " + ", ".join(INPUTS), tuple(INPUTS), required=True),
+    choice("input", "uncertain input: " + ", ".join(INPUTS), tuple(INPUTS), required=True),
     number(
-        "u", "how uncertain it is: its standard uncertainty, or what u_is says", 0, required=True
+        "u", "standard uncertainty of the input, or the quantity that u_is states", 0, required=True
     ),
     choice(
         "unit",
@@ -193,15 +194,15 @@ COLUMNS = (
     ),
     choice(
         "u_is",
-        "what u is: standard; half_width of a bounded distribution; expanded, with its k; scale or"
-        " sd of a t distribution; blank: standard",
+        "meaning of u: standard; half_width of a bounded distribution; expanded, with its k;"
+        " scale or sd of a t distribution; blank: standard",
         AS_READ,
     ),
     number("k", "coverage factor of an expanded uncertainty", 1, 20),
     choice("type", "A (statistics) or B; blank: B", ("A", "B")),
-    choice("distribution", "blank: normal", ("normal", *FAMILIES, "t")),
+    choice("distribution", "distribution of the input; blank: normal", ("normal", *FAMILIES, "t")),
     number("dof", "degrees of freedom, 1 or more; blank: infinite", 1),
-    Field("note", "text", "where the figure comes from"),
+    Field("note", "text", "source of the value"),
 )
 
 OF_T = ("scale", "sd")
@@ -314,16 +315,14 @@ def _of_t(u_is, dof):
         if u_is is None:
             yield (
                 "u_is",
-                message(
-                    "t_blank", "blank; expected scale or sd: of a t distribution u may be either"
-                ),
+                message("t_blank", "blank; expected scale or sd for a t distribution"),
             )
         else:
             yield (
                 "u_is",
                 message(
                     "t_other",
-                    "found {u_is}; expected scale or sd: of a t distribution u may be either",
+                    "found {u_is}; expected scale or sd for a t distribution",
                     u_is=u_is,
                 ),
             )
@@ -349,7 +348,7 @@ def _of_others(u_is, name):
             "u_is",
             message(
                 "only_beside_t",
-                "found {u_is}; expected it only with distribution = t; this one is {name}",
+                "found {u_is}; expected only with distribution = t; the distribution is {name}",
                 u_is=u_is,
                 name=name,
             ),

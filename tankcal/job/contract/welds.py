@@ -7,7 +7,7 @@ from tankcal.job.fields import Field
 from tankcal.messages import message
 
 COLUMNS = (
-    Field("course", "name", "course of courses.csv that the weld is in", required=True),
+    Field("course", "name", "course of courses.csv with the weld", required=True),
     number(
         "azimuth_deg",
         "azimuth of the vertical weld about the axis, clockwise from +y of the points, degrees",
