@@ -159,7 +159,7 @@ ROWS_OF_VERTICAL = [
     ("bottom", [(1.0, 2.0, 0.0)] * 12, None, "x_m", "in one place or on one line"),
     ("bottom", [(x / 5, x / 3, 0.0) for x in range(12)], None, "x_m", "on one line"),
     ("bottom", [*RINGS, (7.5, 0.0, 0.0)], 19, "x_m", "a radius of 6.5 m"),
-    ("bottom", [*RINGS, (0.0, 0.0, -0.1)], 19, "x_m", "the same x and y as row 2"),
+    ("bottom", [*RINGS, (0.0, 0.0, -0.1)], 19, "x_m", "x and y of row 2 again"),
     ("bottom", [*RINGS, (1.0, 1.0, 1.5)], 19, "z_m", "1.5 m above datum.bottom_z_m"),
     ("bottom", [*RINGS, (1.0, 1.0, -13.5)], 19, "z_m", "13.5 m below datum.bottom_z_m"),
     ("bottom", [(1e3 * x, 1e3 * y, z) for x, y, z in RINGS], None, "x_m", "in millimetres"),

@@ -120,8 +120,8 @@ THICKNESS = (
     _name("instrument", "gauge of instruments.toml"),
     Field("azimuth_deg", "number", "azimuth of the reading, degrees", low=0, high=360),
     _number(
-        "paint_mm", "paint thickness there, millimetres; the mean replaces that in courses.csv",
-        0, 10,
+        "paint_mm", "thickness of the paint there, millimetres; the mean replaces that in"
+        " courses.csv", 0, 10,
     ),
 )  # fmt: skip
 TAPE_CHECKS = (
