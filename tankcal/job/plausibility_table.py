@@ -453,8 +453,8 @@ TABLE = (
         "liquid.volume_m3",
         f"standard deviation of a batch by its meter at most {100 * limits.BATCH_SD:g} % of the"
         " batch; well above the bottom, or well within a horizontal tank, 0.7 to 1.4 times the"
-        " nominal volume between its dips (most batches over 5 or under 0.2 times: a problem); no cause"
-        " of a discrepancy between liquid and geometry beyond 6.6 standard deviations",
+        " nominal volume between its dips (most batches over 5 or under 0.2 times: a problem); no"
+        " cause of a discrepancy between liquid and geometry beyond 6.6 standard deviations",
         "litres, gallons, barrels, a missing batch, a leaking valve, a misread dip",
         "meters.toml, nominal sizes",
         ("batch_too_small", "batch_unlike_sizes", "batches_in_other_unit", "liquid_far_because"),

@@ -1,4 +1,4 @@
-"""The keys of clouds.toml, a section for each file of a scanner, and the table of scan targets."""
+"""Keys of clouds.toml, with a section for each scanner file, and the table of scan targets."""
 
 from tankcal.job.contract.hits import SURFACES
 from tankcal.job.contract.kinds import WITH_POINTS
@@ -6,10 +6,10 @@ from tankcal.job.contract.shorthand import FREE, choice, number, positive
 from tankcal.job.fields import Field
 
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "us_ft": 1200 / 3937, "in": 0.0254}
-OF_FILE = "file"  # in place of a pose: that of the file itself
-DOCUMENTED = "documented"  # of assume
+OF_FILE = "file"  # in place of a pose: the pose stored in the file
+DOCUMENTED = "documented"  # value of the key assume
 KINDS = WITH_POINTS
-ASSUMED = {  # what is taken where nothing is declared, and assume says so (docs/clouds-job.md)
+ASSUMED = {  # values for undeclared keys if assume = documented (docs/clouds-job.md)
     "u_offset_mm": 2.0,
     "u_scale_ppm": 20.0,
     "s_translation_mm": 3.0,
@@ -17,7 +17,7 @@ ASSUMED = {  # what is taken where nothing is declared, and assume says so (docs
 }
 REGISTRATION = ("s_translation_mm", "s_rotation_arcsec")
 RANGING = ("u_offset_mm", "u_scale_ppm")
-OF_SCANNER = (  # what all files of one scanner have alike
+OF_SCANNER = (  # keys with equal values for all files of one scanner
     *("offset_mm", "u_offset_mm", "scale_ppm", "u_scale_ppm", "u_incidence_mm", "certificate"),
 )
 
@@ -119,6 +119,7 @@ CLOUD = (
 
 
 def _coordinate(axis):
+    """Return the column of a coordinate of a scan target."""
     note = f"coordinate {axis} of the target's centre in the scan's own frame, metres"
     return number(f"{axis}_m", note, -1e8, 1e8, required=True)
 
@@ -141,7 +142,7 @@ SCAN_TARGETS = (
     positive("s_mm", "standard deviation of each coordinate, millimetres", 1000, required=True),
 )
 COLUMNS = {"scan_targets": SCAN_TARGETS}
-BESIDE = (  # what ties scans, and what tells an offset
+BESIDE = (  # tables that connect scans or determine an offset
     *("setups", "control", "directions", "zenith_angles", "slope_distances"),
     "circumferences",
 )

@@ -1,4 +1,4 @@
-"""deadwood.csv: its columns; things in the tank, of a size that fits, with the right sign."""
+"""Columns of deadwood.csv, and checks of place, size and sign of the items."""
 
 import re
 
@@ -35,15 +35,15 @@ COLUMNS = (
     number("u_m3", "standard uncertainty of the volume, cubic metres", 0, 1e5),
 )
 
-TOLERANCE_M = 0.05  # by which a thing may stick out of the drawing's tank
-LEAST_HEIGHT_M = 0.05  # of a thing that is given as if it had none
-SUMP_M = 2.0  # what gives room may lie below the bottom
-LARGE_SHARE = 0.1  # of what the tank holds beside it
-SLACK = 1.05  # the drawing's cross-section is not the real one
+TOLERANCE_M = 0.05  # permitted protrusion of an item from the nominal tank
+LEAST_HEIGHT_M = 0.05  # height assumed for an item of zero height
+SUMP_M = 2.0  # permitted depth below the bottom of an item that adds to the capacity
+LARGE_SHARE = 0.1  # volume of an item over that of the tank at its height; warning above
+SLACK = 1.05  # tolerance of the nominal cross-section
 
 
 def check_deadwood(table, extent, log):
-    """Names once; bottom below top, both in the tank; a volume that its slice can hold."""
+    """Check that names are unique, and place, volume and sign of each item plausible."""
     refuse_repeated(table, "name", log)
     columns = (table.of(name) for name in ("name", "bottom_m", "top_m", "volume_m3", "u_m3"))
     for row, name, bottom, top, volume, u in zip(table.rows, *columns, strict=True):
@@ -75,8 +75,8 @@ def check_deadwood(table, extent, log):
 
 
 def _check_sign(table, row, name, volume, log):
-    """What gives room says so by its name; what takes it is negative."""
-    takes, gives = (_is_of(name, words) for words in (TAKES_ROOM, GIVES_ROOM))
+    """Check that the sign of the volume agrees with the name of the item."""
+    takes, gives = (_has_word(name, words) for words in (TAKES_ROOM, GIVES_ROOM))
     values = {"volume_m3": volume, "name": name}
     if volume > 0 and takes and not gives:
         text = message(
@@ -105,12 +105,13 @@ def _check_sign(table, row, name, volume, log):
     log.warning(table.file, text, row, "volume_m3")
 
 
-def _is_of(name, words):
-    """Does the name begin a word with one of these?"""
+def _has_word(name, words):
+    """Determine whether a word of the name begins with any of `words`."""
     return any(re.search(rf"\b{re.escape(word)}", name.lower()) for word in words)
 
 
 def _check_place(table, row, bottom, top, volume, extent, log):
+    """Check that an item lies between the lowest point and the top of the tank."""
     if extent.top_m is not None and top > extent.top_m + TOLERANCE_M:
         expected = message(
             "deadwood_too_high",
@@ -137,6 +138,7 @@ def _check_place(table, row, bottom, top, volume, extent, log):
 
 
 def _check_volume(table, row, height, volume, extent, log):
+    """Check the volume of an item against the volume of the tank over its height."""
     if volume == 0:
         expected = message("deadwood_of_nothing", "found 0, which has no effect")
         log.warning(table.file, expected, row, "volume_m3")

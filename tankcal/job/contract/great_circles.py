@@ -1,4 +1,4 @@
-"""great_circles.csv: equator and meridians of a sphere by tape."""
+"""Columns of great_circles.csv: equator and meridians of a sphere by tape."""
 
 from tankcal.job.contract.observations import USE
 from tankcal.job.contract.strapping import readings_by_tape
@@ -25,4 +25,4 @@ GREAT_CIRCLES = (
     Field("note", "text", "remark for the reader"),
 )
 COLUMNS = {"great_circles": GREAT_CIRCLES}
-BESIDE = ("obstructions", "tape_checks")  # of a strapping that a sphere has, too
+BESIDE = ("obstructions", "tape_checks")  # tables of strapping that a sphere also uses

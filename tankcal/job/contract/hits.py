@@ -1,14 +1,16 @@
-"""The tables of bare wall hits by a total station, and of the control targets read between them."""
+"""Tables of total station hits on the bare wall, and of control targets read between them."""
 
 from tankcal.job.contract.observations import USE, angle_fields
 from tankcal.job.fields import Field
 
 
 def _time(required=False):
+    """Return the column of the time of a reading."""
     return Field("time", "time", "time of the reading, such as 2026-01-05T14:30", required=required)
 
 
 def _distance(note, required=False):
+    """Return the column of a slope distance."""
     return Field("distance_m", "number", note, required=required, low=0, high=1e4, above_low=True)
 
 
@@ -63,12 +65,12 @@ CONTROL_READINGS = (
     _distance("slope distance as read, metres"),
     _time(required=True),
 )
-BESIDE = (  # what ties set-ups, and what tells an offset
+BESIDE = (  # tables that connect set-ups or determine an offset
     *("setups", "control", "directions", "zenith_angles", "slope_distances"),
     *("circumferences", "obstructions"),
 )
 COLUMNS = {"wall_hits": WALL_HITS, "control_readings": CONTROL_READINGS}
-RANGING = (  # keys of instruments.toml
+RANGING = (  # keys of instruments.toml for ranging on the wall
     Field(
         "s_mm",
         "number",

@@ -1,4 +1,4 @@
-"""The keys of job.toml that every kind of tank has, or most of them."""
+"""Keys of job.toml that all or most kinds of tank have."""
 
 from tankcal.job.contract.kinds import KINDS, LOADED, VERTICAL, WITH_POINTS
 from tankcal.job.contract.registers import CAMERA_SETTINGS
@@ -7,9 +7,7 @@ from tankcal.job.fields import Field
 from tankcal.text.languages import LANGUAGES
 
 SPHERE = ("sphere",)
-MOST_BAR = 50  # of a sphere that stores under pressure
-
-# The keys of [table].
+MOST_BAR = 50  # largest gauge pressure of a sphere, bar
 
 TABLE = (
     positive(
@@ -103,10 +101,12 @@ TABLE = (
 
 
 def _text(name, note):
+    """Return a key for a text."""
     return Field(name, "text", note)
 
 
 def _size(name, note, high, required_for=()):
+    """Return a key for a nominal size, metres."""
     return number(name, note, 0.1, high, required_for=required_for)
 
 
@@ -329,6 +329,6 @@ KEYS = {
     "csv": CSV,
 }
 
-# what forms of these surveys have beforehand, in place of `start`
+# Values that starter forms of these surveys contain, in place of `start`.
 STARTS_OF_STRAPPING = {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
-STARTS_OF_LIQUID = {"survey.side": "inside", "datum.bottom_z_m": "0.0"}  # of upright tanks
+STARTS_OF_LIQUID = {"survey.side": "inside", "datum.bottom_z_m": "0.0"}  # vertical tanks only

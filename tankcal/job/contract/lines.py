@@ -1,4 +1,4 @@
-"""The tables of reference lines: lines of sight round a tank, and offsets of its wall from them."""
+"""Tables of reference lines: lines of sight round a tank and offsets of the wall from them."""
 
 from tankcal.job.contract.observations import USE
 from tankcal.job.fields import Field
@@ -68,7 +68,7 @@ OFFSETS = (
     USE,
 )
 COLUMNS = {"lines": LINES, "offsets": OFFSETS}
-PLUMMET = (  # keys of instruments.toml
+PLUMMET = (  # keys of instruments.toml for plummets
     Field(
         "u_collimation_arcsec",
         "number",

@@ -1,13 +1,15 @@
-"""Calibration by liquid: the keys of meters.toml and of [liquid], and the columns of liquid.csv."""
+"""Keys of meters.toml and [liquid], and columns of liquid.csv, for calibration with liquid."""
 
 from tankcal.job.contract.kinds import VERTICAL
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.fields import Field
 
 JOINT, ALONE, GEOMETRY = TABLES = ("joint", "liquid", "geometry")  # which table is printed
-EXPANSION_SHARE = 0.05  # u of the liquid's expansion that is not given, of its value
-TEMPERATURE_SD_K = 0.2  # of one temperature, where it is not given
-RADIUS_SHARE = 0.005  # sd of the radii of an upright tank that liquid alone tells, of the nominal
+EXPANSION_SHARE = 0.05  # default relative standard uncertainty of the liquid's expansion
+TEMPERATURE_SD_K = 0.2  # default standard deviation of one temperature
+# Default standard deviation, over the nominal radius, of the radii of a vertical tank calibrated
+# with liquid only.
+RADIUS_SHARE = 0.005
 
 METER = (
     number("factor", "meter factor: true volume = factor x indicated", 0.9, 1.1, required=True),
@@ -51,6 +53,7 @@ METER = (
 
 
 def _temperature(name, note):
+    """Return the column of a temperature of a run."""
     return number(name, f"{note}, degrees Celsius; blank in all rows: no correction", -200, 300)
 
 
@@ -184,7 +187,7 @@ SETTINGS = (
     ),
 )
 KEYS = {"liquid": SETTINGS}
-NEEDED = (  # of [liquid], with liquid.csv
+NEEDED = (  # keys of [liquid] required with liquid.csv
     *("density_kg_m3", "density_temperature_c", "expansion_per_k", "u_density_kg_m3"),
     "u_dip_zero_mm",
 )
