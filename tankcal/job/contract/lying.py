@@ -1,4 +1,4 @@
-"""[horizontal] and [sphere]: their keys; sizes complete, consistent, and said once."""
+"""Keys of [horizontal] and [sphere], and checks that sizes are complete and consistent."""
 
 from tankcal.job.checking import is_not_given, missing_beside, settings_place, tell
 from tankcal.job.contract.ends import HORIZONTAL_ONLY, check_end, end_keys
@@ -10,10 +10,12 @@ SPHERE_ONLY = ("sphere",)
 
 
 def _length(name, note, kinds, high=100.0, required=False):
+    """Return a key for a length above 0, metres."""
     return positive(name, note, high, required=required, kinds=kinds)
 
 
 def _thickness(kinds):
+    """Return the key of the thickness of plate and paint."""
     return number(
         "thickness_mm",
         "thickness of plate and paint together, millimetres; subtracted from outside measurements",
@@ -124,7 +126,7 @@ SPHERE = (
 
 KEYS = {"horizontal": HORIZONTAL, "sphere": SPHERE}
 
-STRONG_TILT_MM_PER_M = 50
+STRONG_TILT_MM_PER_M = 50  # warning above
 ROUND_TUBE = message(
     "tube_round_only", "expected only for a round cylinder: diameter_m, or points.csv"
 )
@@ -137,10 +139,18 @@ SIZES = ("diameter_m", "width_m", "height_m")
 
 
 def check_horizontal(values, wall, raw, log, height_m=None):
-    """Sizes, ends, tilt and dip point of a horizontal cylinder.
+    """Check sizes, ends, tilt and dip point of a horizontal cylinder.
 
-    wall      what it comes from: "points", "straps", or None: the sizes
-    height_m  of the cylinder where a tape tells it, about
+    Parameters
+    ----------
+    values : dict
+        Values of job.toml.
+    wall : {"points", "straps"} or None
+        Source of the cylinder; None: sizes of [horizontal].
+    raw, log
+        Raw job, and log of its problems.
+    height_m : float, optional
+        Approximate height of the cylinder, m, if determined by tape.
     """
     has_points = wall == "points"
 
@@ -192,7 +202,10 @@ def check_horizontal(values, wall, raw, log, height_m=None):
 
 
 def _check_ringed(given, raw, log):
-    """Rings have sizes and plates of their own; thickness_mm is of the ends alone."""
+    """Refuse sizes beside rings, and require thickness_mm for curved ends.
+
+    Rings have their own sizes and plates; thickness_mm then applies to the ends only.
+    """
     for key in (*SIZES, "roll_deg"):
         if given[key]:
             expected = message(
@@ -215,6 +228,7 @@ def _check_ringed(given, raw, log):
 
 
 def _refuse_given(given, keys, raw, log, section="horizontal"):
+    """Refuse sizes that are determined by points.csv."""
     for key in keys:
         if given[key] is not None:
             expected = message(
@@ -226,7 +240,7 @@ def _refuse_given(given, keys, raw, log, section="horizontal"):
 
 
 def _check_sizes(given, raw, log):
-    """A diameter, or width and height."""
+    """Check that either a diameter, or width and height, are given."""
 
     def missing(key):
         return is_not_given(raw, "horizontal", key)
@@ -253,7 +267,7 @@ def _check_sizes(given, raw, log):
 
 
 def _check_thickness(given, side, section, raw, log):
-    """Plates count for what was measured outside only, and there they must be said."""
+    """Require thickness_mm with an outside survey, and refuse it with an inside survey."""
     if side == "outside" and is_not_given(raw, section, "thickness_mm"):
         expected = message(
             "thickness_missing",
@@ -270,6 +284,7 @@ def _check_thickness(given, side, section, raw, log):
 
 
 def _check_dip(given, height_m, raw, log):
+    """Check that the dip point lies within the cylinder, and that tilt and roll are plausible."""
     dip, length, tilt = (given[key] for key in ("dip_from_a_m", "length_m", "tilt_mm_per_m"))
     height = given["height_m"] or given["diameter_m"] or height_m
     if None not in (dip, length):
@@ -313,7 +328,7 @@ def _check_dip(given, height_m, raw, log):
 
 
 def _check_tube(given, has_points, raw, log):
-    """A gauge tube off the axis or off the plumb: across a round tank, and not plumb in a tilt."""
+    """Check that a gauge tube crosses a round tank, and does not lean in a tilted tank."""
     keys = [key for key in ("tube_angle_deg", "tube_offset_m") if given[key]]
     diameter = given["diameter_m"]
     for key in keys:
@@ -347,7 +362,19 @@ def _check_tube(given, has_points, raw, log):
 
 
 def check_sphere(values, has_points, has_circles, is_loaded, raw, log):
-    """The diameter, points of the wall, or great circles; plates where something loads them."""
+    """Check that a sphere has one source of its diameter, and plates if it is loaded.
+
+    Parameters
+    ----------
+    values : dict
+        Values of job.toml.
+    has_points, has_circles : bool
+        Whether the job has points.csv, or great_circles.csv.
+    is_loaded : bool
+        Whether a pressure or a density loads the sphere.
+    raw, log
+        Raw job, and log of its problems.
+    """
     given = values["sphere"]
     if not is_loaded or values["survey"]["side"] == "outside":
         _check_thickness(given, values["survey"]["side"], "sphere", raw, log)

@@ -1,4 +1,4 @@
-"""The columns of the tables of a survey: photographs, angles, distances, levels, control."""
+"""Columns of the tables of a survey: photographs, angles, distances, heights, control."""
 
 from dataclasses import dataclass
 
@@ -15,14 +15,17 @@ USE = Field(
 
 
 def _name(name, note, required=True):
+    """Return a column for a name."""
     return Field(name, "name", note, required=required)
 
 
 def _number(name, note, low, high, required=False, above_low=False):
+    """Return a column for a number from `low` to `high`."""
     return Field(name, "number", note, required=required, low=low, high=high, above_low=above_low)
 
 
 def _coordinates(required=False):
+    """Return the columns of the coordinates x, y and z."""
     return tuple(
         _number(
             f"{axis}_m",
@@ -70,6 +73,7 @@ def angle_fields(name, note, circles=(0, 1)):
 
 
 def _sd_mm(of):
+    """Return the column of a required standard deviation, millimetres."""
     note = f"standard deviation of {of}, millimetres; 0: held fixed"
     return _number("s_mm", note, 0, 1e6, required=True)
 
@@ -85,6 +89,7 @@ _INSTRUMENT = _name("instrument", "instrument of instruments.toml", required=Fal
 
 
 def _known_points():
+    """Return the columns of the standard deviations of known coordinates."""
     return tuple(
         _number(
             f"s{axis}_mm",
@@ -317,17 +322,17 @@ VECTORS = (
 
 @dataclass(frozen=True)
 class SurveyTable:
-    """A table of a survey: its columns, and what its rows are.
+    """Columns of a table of a survey, and the kind of its rows.
 
     Attributes
     ----------
     columns : tuple of Field
     is_reading : bool
-        Its rows are readings between points.
+        Whether the rows are readings between points.
     angle : str
-        The angle that is read, whose columns carry its unit; "" for a table of lengths.
+        Name of the angle, whose columns end with a unit; "" for a table of lengths.
     may_correlate : bool
-        Its readings may be correlated with others (correlated_readings.csv).
+        Whether readings may be correlated with other readings (correlated_readings.csv).
     """
 
     columns: tuple[Field, ...]
@@ -336,11 +341,12 @@ class SurveyTable:
     may_correlate: bool = False
 
 
-def _read(columns, angle="", may_correlate=True):
+def _define_readings(columns, angle="", may_correlate=True):
+    """Return the `SurveyTable` of a table of readings."""
     return SurveyTable(columns, True, angle, may_correlate)
 
 
-# a new kind of reading is one line here, its columns above
+# A new kind of reading requires only a line here, and its columns above.
 TABLES = {
     "targets": SurveyTable(TARGETS),
     "photos": SurveyTable(PHOTOS),
@@ -350,16 +356,16 @@ TABLES = {
     "control": SurveyTable(CONTROL, may_correlate=True),
     "check": SurveyTable(CHECK),
     "setups": SurveyTable(SETUPS),
-    "distances": _read(DISTANCES),
-    "slope_distances": _read(SLOPE_DISTANCES),
-    "directions": _read(DIRECTIONS, "direction"),
-    "zenith_angles": _read(ZENITH_ANGLES, "zenith"),
-    "azimuths": _read(AZIMUTHS, "azimuth"),
-    "horizontal_angles": _read(HORIZONTAL_ANGLES, "angle"),
-    "vertical_angles": _read(VERTICAL_ANGLES, "angle"),
-    "height_differences": _read(HEIGHT_DIFFERENCES),
-    "plumb_lines": _read(PLUMB_LINES, may_correlate=False),
-    "vectors": _read(VECTORS),
+    "distances": _define_readings(DISTANCES),
+    "slope_distances": _define_readings(SLOPE_DISTANCES),
+    "directions": _define_readings(DIRECTIONS, "direction"),
+    "zenith_angles": _define_readings(ZENITH_ANGLES, "zenith"),
+    "azimuths": _define_readings(AZIMUTHS, "azimuth"),
+    "horizontal_angles": _define_readings(HORIZONTAL_ANGLES, "angle"),
+    "vertical_angles": _define_readings(VERTICAL_ANGLES, "angle"),
+    "height_differences": _define_readings(HEIGHT_DIFFERENCES),
+    "plumb_lines": _define_readings(PLUMB_LINES, may_correlate=False),
+    "vectors": _define_readings(VECTORS),
 }
 CORRELATED_READINGS = (
     *(
@@ -371,7 +377,7 @@ CORRELATED_READINGS = (
                 "choice",
                 f"{which}: table that contains it",
                 required=True,
-                choices=tuple(name for name, one in TABLES.items() if one.may_correlate),
+                choices=tuple(name for name, table in TABLES.items() if table.may_correlate),
             ),
             Field(
                 f"row_{number}",
@@ -393,11 +399,11 @@ CORRELATED_READINGS = (
     _number("r", "correlation of the two values", -1, 1, True),
 )
 
-COLUMNS = {name: one.columns for name, one in TABLES.items()}
+COLUMNS = {name: table.columns for name, table in TABLES.items()}
 COLUMNS["correlated_readings"] = CORRELATED_READINGS
-READINGS = tuple(name for name, one in TABLES.items() if one.is_reading)
-ANGLES = {name: one.angle for name, one in TABLES.items() if one.angle}
-# tables of each usual kind of survey; those of the other kind may be added
+READINGS = tuple(name for name, table in TABLES.items() if table.is_reading)
+ANGLES = {name: table.angle for name, table in TABLES.items() if table.angle}
+# Tables of each usual kind of survey; tables of the other kind may be added.
 SURVEYS = {
     "photos": (
         *("photos", "image_points", "targets", "control", "check", "distances"),

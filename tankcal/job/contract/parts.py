@@ -1,4 +1,4 @@
-"""The keys of [mesh], [corrections], [checks] and [inspection]: most are for some kinds only."""
+"""Keys of [mesh], [corrections], [checks] and [inspection], most of them for some kinds only."""
 
 from tankcal.job.contract.kinds import LOADED, VERTICAL, WITH_POINTS
 from tankcal.job.contract.shorthand import choice, number, positive
@@ -27,6 +27,7 @@ MESH = (
 
 
 def _switch(name, note, kinds=()):
+    """Return the key of a correction that can be switched off."""
     return Field(name, "flag", f"{note}; blank: true", kinds=kinds)
 
 

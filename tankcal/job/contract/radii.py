@@ -1,12 +1,11 @@
-"""The radii of a shell that a former table, a record or a declaration gives: radii.csv, [radii],
-and how they may have changed since, [change]."""
+"""Former radii of a shell (radii.csv, [radii]) and their possible change since then ([change])."""
 
 from tankcal.job.contract.kinds import VERTICAL
 from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.fields import Field
 
-SOURCES = TABLE, RECORD, DECLARED = ("table", "record", "declared")  # where radii come from
-MOST_MM = 1000  # of an uncertainty of a radius
+SOURCES = TABLE, RECORD, DECLARED = ("table", "record", "declared")  # sources of the radii
+MOST_MM = 1000  # largest uncertainty of a radius
 
 RADII = (
     Field("course", "name", "course of courses.csv, unique in the file", required=True),
@@ -29,6 +28,7 @@ COLUMNS = {"radii": RADII}
 
 
 def _mm(name, note):
+    """Return a key for an uncertainty of a radius, millimetres."""
     return number(name, note, 0, MOST_MM, kinds=VERTICAL)
 
 
@@ -74,5 +74,5 @@ CHANGE = (
     ),
 )
 KEYS = {"radii": SETTINGS, "change": CHANGE}
-NEEDED = ("source", "u_common_mm")  # of [radii], with radii.csv
-NEEDED_OF_CHANGE = ("common_mm", "own_mm")  # of [change], with a survey
+NEEDED = ("source", "u_common_mm")  # keys of [radii] required with radii.csv
+NEEDED_OF_CHANGE = ("common_mm", "own_mm")  # keys of [change] required with a survey

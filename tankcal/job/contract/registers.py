@@ -1,4 +1,4 @@
-"""The keys of cameras.toml, instruments.toml, clouds.toml, meters.toml, [adjustment.camera]."""
+"""Keys of cameras.toml, instruments.toml, clouds.toml, meters.toml and [adjustment.camera]."""
 
 from tankcal.camera.comparator import KINDS as TRANSFORMATIONS
 from tankcal.camera.model import AFFINITIES, CONVENTIONS
@@ -13,7 +13,7 @@ from tankcal.job.fields import Field
 from tankcal.survey.network.survey import STATES
 
 INSTRUMENT_KINDS = ("tape", "edm", "total_station", "theodolite", "level", "plummet", "stadia")
-# name in cameras.toml and largest magnitude of each parameter, by its name in tankcal.camera.model
+# Key in cameras.toml and largest magnitude of each parameter of tankcal.camera.model.
 PARAMETER_KEYS = {
     "c": ("c_mm", 1e5),
     "x0": ("x0_mm", 1e4),
@@ -29,7 +29,7 @@ PARAMETER_KEYS = {
     "A": ("A", 0.1),
     "B": ("B", 0.1),
 }
-SECOND_NAMES = {"A": "b1", "B": "b2"}  # of the form b1_b2
+SECOND_NAMES = {"A": "b1", "B": "b2"}  # names of the parameters in the form b1_b2
 _NOTES = {
     "c": "principal distance, millimetres",
     "x0": "principal point, to the right of the middle of the format, millimetres",
@@ -42,15 +42,17 @@ _NOTES = {
 
 
 def _note(name):
+    """Return the note of a parameter."""
     kind = "radial" if name.startswith("K") else "decentring"
     return _NOTES.get(name, f"{kind} distortion {name}")
 
 
 def _value(name, key=None):
-    own_key, largest = PARAMETER_KEYS[name]
+    """Return the key of the value of a parameter, or another key for it."""
+    usual_key, largest = PARAMETER_KEYS[name]
     low = 0 if name == "c" else -largest
     return Field(
-        key or own_key,
+        key or usual_key,
         "number",
         _note(key or name),
         required=name == "c",
@@ -61,11 +63,12 @@ def _value(name, key=None):
 
 
 def sd_key(name):
-    """Key of the standard deviation of a parameter, in the unit of its value."""
+    """Return the key of the standard deviation of a parameter, in the unit of its value."""
     return f"s_{name}_mm" if name in ("c", "x0", "y0") else f"s_{name}"
 
 
 def _sd(name, of=None):
+    """Return the key of a standard deviation; of: parameter whose bound applies, if not `name`."""
     note = f"standard deviation of {name}, in the unit of the parameter; 0: held fixed"
     return Field(sd_key(name), "number", note, low=0, high=PARAMETER_KEYS[of or name][1])
 
@@ -73,7 +76,7 @@ def _sd(name, of=None):
 AFFINITIES_BY_AUTHOR = {"silva": "both_y", "pessoa": "both_x"}
 MARKS = "marks"
 FOCUS_CALIBRATIONS = "focus_calibrations"
-# [cameras.NAME.marks] has keys of the user's own, each with the same kind of value
+# Keys chosen by the user in [cameras.NAME.marks], all with one kind of value.
 FAMILIES = {
     "cameras": {
         MARKS: Field(
@@ -241,6 +244,7 @@ SCOPES_AND_STATES = (
 
 
 def _override(name, note):
+    """Return a key for the scope and state of a camera parameter."""
     return Field(name, "choice", note, choices=SCOPES_AND_STATES, of_survey=True)
 
 
@@ -252,7 +256,7 @@ CAMERA_SETTINGS = (
     *(_override(key, _note(key)) for key in SECOND_NAMES.values()),
 )
 
-# other spellings of keys, of the same meaning and unit: K1 for K1_mm-2, s_c for s_c_mm
+# Alternative spellings of keys, with equal meaning and unit: K1 for K1_mm-2, s_c for s_c_mm.
 SHORT_KEYS = {
     "cameras": {key: name for name, (key, _) in PARAMETER_KEYS.items() if name[0] in "KP"}
     | {sd_key(name): f"s_{name}" for name in ("c", "x0", "y0")},
@@ -277,5 +281,5 @@ REGISTERS_OF_SURVEY = {
     "cloud": ("clouds", "instruments"),
     "liquid": ("meters",),
 }
-# keys of [adjustment] that need photographs
+# Keys of [adjustment] that require photographs.
 OF_PHOTOS = ("fixed_photo", "image_sd_um", "reading_limit_um", "depth_of_field", "image_weights")

@@ -1,4 +1,4 @@
-"""rings.csv: the rings of a lying cylinder, from end A to end B, and checks of it alone."""
+"""Columns of rings.csv, the rings of a horizontal cylinder from end A to end B, and its checks."""
 
 from itertools import pairwise
 
@@ -30,13 +30,23 @@ RINGS = (
 COLUMNS = {"rings": RINGS}
 
 MOST_RINGS = 100
-MISS_M, MISS_RELATIVE = 0.020, 0.002  # of the sum of the rings from the length of the cylinder
+# Largest difference of the sum of the rings from the length of the cylinder: metres, or relative.
+MISS_M, MISS_RELATIVE = 0.020, 0.002
 
 
 def check_rings_alone(rings, gauged, values, log):
-    """Ring names once, plates that are known and credible, lengths that add up, laps in turn.
+    """Check names, plates, lengths and laps of the rings.
 
-    gauged  names of rings whose plates a gauge read
+    Parameters
+    ----------
+    rings : ColumnValues
+        Rows of rings.csv.
+    gauged : set of str
+        Names of the rings with readings of a thickness gauge.
+    values : dict or None
+        Values of job.toml.
+    log
+        Log of the problems.
     """
     refuse_repeated(rings, "ring", log)
     if len(rings.rows) > MOST_RINGS:
@@ -63,7 +73,7 @@ def check_rings_alone(rings, gauged, values, log):
     if values is not None:
         _check_sum(rings, values["horizontal"]["length_m"], log)
     laps = rings.of("lap")
-    if None not in laps and any(one == other for one, other in pairwise(laps)):
+    if None not in laps and any(lap == next_lap for lap, next_lap in pairwise(laps)):
         expected = message(
             "laps_not_in_turn",
             "adjacent rings are both inner, or both outer; lap-jointed rings alternate",
@@ -72,6 +82,7 @@ def check_rings_alone(rings, gauged, values, log):
 
 
 def _check_sum(rings, whole_m, log):
+    """Check that the rings add up to the length of the cylinder, m."""
     lengths = rings.of("length_m")
     if whole_m is None or None in lengths or rings.skipped:
         return

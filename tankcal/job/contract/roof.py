@@ -1,4 +1,4 @@
-"""[roof]: its keys; all of them or none, and a roof of a credible size for the tank."""
+"""Keys of [roof], and checks that they are complete and plausible for the tank."""
 
 from tankcal.job.checking import RELATIVE_DENSITY, is_not_given, missing_beside, tell
 from tankcal.job.contract.kinds import VERTICAL
@@ -42,11 +42,12 @@ KEYS = (
     ),
 )
 
-LIGHTEST_KG_M2, HEAVIEST_KG_M2 = 1.0, 1000.0  # aluminium skins have 5, steel double decks 120
+# Possible mass per area of the tank; aluminium skins have 5 kg/m2, steel double decks 120 kg/m2.
+LIGHTEST_KG_M2, HEAVIEST_KG_M2 = 1.0, 1000.0
 
 
 def upside_down(low, high):
-    """What is said of a critical_top_m that is not above critical_bottom_m."""
+    """Return the message for a critical_top_m that is not above critical_bottom_m."""
     return message(
         "roof_upside_down",
         "found {high:g}; expected above critical_bottom_m = {low:g}",
@@ -56,7 +57,7 @@ def upside_down(low, high):
 
 
 def check_roof(roof, extent, raw, log):
-    """All keys or none; critical heights in order and within the shell; a mass that can float."""
+    """Check that all keys are given or none, and critical heights and mass are plausible."""
     names = [field.name for field in KEYS]
     given = [name for name in names if not is_not_given(raw, "roof", name)]
     for name in names:
@@ -82,6 +83,7 @@ def check_roof(roof, extent, raw, log):
 
 
 def _check_mass(roof, area, raw, log):
+    """Check the mass against the cross-section of the tank, m2, and the draught of the roof."""
     mass, density = roof["mass_kg"], roof["reference_density_kg_m3"]
     if not LIGHTEST_KG_M2 <= mass / area <= HEAVIEST_KG_M2:
         guess = message("in_grams", "is it in grams?")

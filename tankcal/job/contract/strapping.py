@@ -1,11 +1,11 @@
-"""The tables and keys of strapping: circumferences by tape, what is in its way, gauges, tapes."""
+"""Tables and keys of strapping: circumferences, obstructions, plate thicknesses and tapes."""
 
 from tankcal.job.contract.kinds import LYING, STRAPPED, VERTICAL
 from tankcal.job.contract.observations import USE
 from tankcal.job.fields import Field
 from tankcal.survey.strapping import KINDS
 
-NEEDED = {  # of an obstruction, by its kind
+NEEDED = {  # columns required for each kind of obstruction
     "butt_strap": ("thickness_mm", "width_mm"),
     "weld": ("thickness_mm", "width_mm"),
     "step": ("thickness_mm",),
@@ -17,16 +17,18 @@ NEEDED = {  # of an obstruction, by its kind
 
 
 def _name(name, note, required=False, kinds=()):
+    """Return a column for a name."""
     return Field(name, "name", note, required=required, kinds=kinds)
 
 
 def _number(name, note, low, high, required=False, above_low=False, kinds=()):
+    """Return a column for a number from `low` to `high`."""
     bounds = {"low": low, "high": high, "above_low": above_low}
     return Field(name, "number", note, required=required, kinds=kinds, **bounds)
 
 
 def readings_by_tape(reading_note):
-    """Columns of what was read on a tape, and how, of any circumference."""
+    """Return the columns of a tape reading of a circumference, and of its conditions."""
     return (
         _number("reading_m", reading_note, 0.3, 1000, required=True),
         _number(
@@ -132,7 +134,7 @@ TAPE_CHECKS = (
             0, 100),
     Field("when", "choice", "comparison before or after the work", choices=("before", "after")),
 )  # fmt: skip
-IN_PLACE = {"course": "ring", "level_m": "from_a_m"}  # columns of lying tanks
+IN_PLACE = {"course": "ring", "level_m": "from_a_m"}  # columns of horizontal tanks
 COLUMNS = {
     "circumferences": CIRCUMFERENCES,
     "obstructions": OBSTRUCTIONS,
@@ -171,7 +173,7 @@ KEYS = {
         ),
     ),
 }
-TAPE = (  # keys of instruments.toml
+TAPE = (  # keys of instruments.toml for tapes
     _number("thickness_mm", "thickness of a tape for strapping, millimetres", 0, 5),
     _number(
         "section_mm2",

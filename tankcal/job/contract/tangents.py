@@ -1,4 +1,4 @@
-"""The table of tangents: sights to the limbs of a tank from set-ups of a traverse round it."""
+"""Table of tangents: sights to the limbs of a tank from set-ups of a traverse round it."""
 
 from tankcal.job.contract.observations import USE, angle_fields
 from tankcal.job.fields import Field
@@ -43,7 +43,7 @@ TANGENTS = (
     ),
     USE,
 )
-BESIDE = (  # the traverse that ties the set-ups, and a tape that is joined
+BESIDE = (  # tables of the traverse and of circumferences by tape
     *("setups", "control", "directions", "zenith_angles", "slope_distances"),
     *("stadia", "circumferences", "obstructions"),
 )

@@ -1,4 +1,4 @@
-"""[top]: the keys of a head on an upright tank; its form complete, and of a credible size."""
+"""Keys of [top], the head of a vertical tank, and checks of its form and sizes."""
 
 from tankcal.job.checking import is_not_given, missing_beside, tell
 from tankcal.job.contract.bottom import DEEPEST, SHAPED
@@ -32,7 +32,7 @@ KEYS = (
 
 
 def depth_of_top(values):
-    """Rise of the head over the shell, m; 0 without one, None: that is not known."""
+    """Return the height of the head above the shell, m; 0 without a head, None if unknown."""
     given, diameter = values["top"], values["tank"]["nominal_diameter_m"]
     if given["form"] is None or values["corrections"]["top"] is False:
         return 0.0
@@ -40,14 +40,14 @@ def depth_of_top(values):
 
 
 def check_top(values, is_metered, raw, log):
-    """The form with its sizes, nothing without it, and sizes that go with the diameter."""
+    """Check that a head has a form and sizes, and sizes that fit the diameter."""
     given, form, depth = values["top"], values["top"]["form"], values["top"]["depth_m"]
     diameter = values["tank"]["nominal_diameter_m"]
     names = [field.name for field in KEYS]
     if is_not_given(raw, "top", "form"):
-        there = [name for name in names if not is_not_given(raw, "top", name)]
-        if there:
-            tell(log.problem, raw, "top", "form", missing_beside(there[0]))
+        present = [name for name in names if not is_not_given(raw, "top", name)]
+        if present:
+            tell(log.problem, raw, "top", "form", missing_beside(present[0]))
         return
     if form is None:
         return
