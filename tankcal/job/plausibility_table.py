@@ -143,7 +143,7 @@ TABLE = (
     ),
     Plausible(
         "courses: their order",
-        f"the top course at most {limits.RISING_PLATES:g} times as thick as the bottom one; no"
+        f"the top course at most {limits.RISING_PLATES:g} times as thick as the bottom course; no"
         f" level ring of points within {1000 * limits.NEAR_JOINT_M:g} mm of a joint",
         "courses from the top down, a wrong height",
         "plates, rings of points.csv",

@@ -296,7 +296,7 @@ SETTINGS_OF_KINDS = [
         "horizontal.end_a_dish_radius_m",
         "only for a torispherical",
     ),
-    ("horizontal", {"horizontal.tilt_mm_per_m": 5.0}, "horizontal.dip_from_a_m", "leans"),
+    ("horizontal", {"horizontal.tilt_mm_per_m": 5.0}, "horizontal.dip_from_a_m", "is tilted"),
     ("horizontal", {"horizontal.tilt_mm_per_m": 300.0}, "horizontal.tilt_mm_per_m", "200"),
     ("horizontal", {"horizontal.dip_from_a_m": 10.1}, "horizontal.dip_from_a_m", "0 to 10 m"),
     (
