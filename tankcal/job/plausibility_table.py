@@ -1,7 +1,7 @@
 """Table of plausible ranges and cross-checks in words, with the codes of their messages.
 
-`docs/plausibility.md` shows TABLE; a test compares both. `tankcal.job.plausibility` contains the
-limits.
+`docs/plausibility.md` shows TABLE; a test compares the two. The limits are defined in
+`tankcal.job.plausibility`.
 """
 
 from dataclasses import dataclass
@@ -11,22 +11,22 @@ from tankcal.job import plausibility as limits
 
 @dataclass(frozen=True)
 class Plausible:
-    """One line of the table.
+    """Line of the table.
 
     Attributes
     ----------
     what : str
-        Keys of job.toml and columns of tables, as written in the files.
+        Keys of job.toml and columns of tables, as written in a job.
     expected : str
-        Plausible range.
+        Plausible range, in words.
     slip : str
-        Mistake that the check detects.
+        Typical errors that the range detects.
     against : str
-        Quantities that the number is compared with.
+        Quantity with which the number is compared; "" without a comparison.
     codes : tuple of str
-        Codes of the messages.
+        Codes of the messages that report an implausible number.
     verified : bool
-        False: a limit of a standard that was read in a secondary source.
+        False: limit of a standard, taken from a secondary source.
     """
 
     what: str
@@ -37,27 +37,33 @@ class Plausible:
     verified: bool = True
 
 
-def _c(bounds):
+def _celsius_range(bounds):
+    """Bounds in degrees Celsius, as a text."""
     return f"{bounds[0]:g} to {bounds[1]:g} °C"
 
 
-def _per_k(shell):
+def _expansion_range(shell):
+    """Plausible coefficients of thermal expansion of a metal, as a text."""
     low, high = limits.EXPANSION_PER_K[shell]
     return f"{low:g} to {high:g} 1/K"
 
 
-def _line(kind):
-    (a, b), (c, d) = limits.SOLID_PLATES_MM[kind]
-    return f"({a:g} + {b:g} D) to ({c:g} + {d:g} D) mm, D in m"
+def _plate_range(kind):
+    """Plausible plates of a kind of tank, two lines in the diameter D, as a text."""
+    thinnest, thickest = limits.SOLID_PLATES_MM[kind]
+    return (
+        f"({thinnest[0]:g} + {thinnest[1]:g} D) to ({thickest[0]:g} + {thickest[1]:g} D) mm, D in m"
+    )
 
 
 def _thinnest(shell):
-    a, b = limits.THIN_MM[shell]
-    lines = [f"{least:g} + {per_m:g} D" for least, per_m in dict.fromkeys((a, b))]
+    """Least plate of a metal, the lesser of two lines in the diameter D, as a text."""
+    lines = [f"{least:g} + {per_m:g} D" for least, per_m in dict.fromkeys(limits.THIN_MM[shell])]
     return lines[0] + " mm" if len(lines) == 1 else f"the lesser of {' and '.join(lines)} mm"
 
 
-def _of_ends(form):
+def _depth_range(form):
+    """Plausible depths of an end over its diameter, as a text."""
     low, high = limits.END_DEPTH[form]
     hemisphere = f" or {limits.HEMISPHERE:g} to 0.5" if form == "spherical" else ""
     return f"{form} {low:g} to {high:g}{hemisphere}"
@@ -66,9 +72,9 @@ def _of_ends(form):
 TABLE = (
     Plausible(
         "survey.date",
-        f"year {limits.FIRST_YEAR} to today, of a plan up to {limits.YEARS_PLANNED} years ahead"
+        f"year {limits.FIRST_YEAR} to today; for a plan up to {limits.YEARS_PLANNED} years ahead"
         " (problem)",
-        "1024 for 2024, a day to come",
+        "1024 for 2024, a date in the future",
         "today's date",
         ("survey_date_impossible",),
     ),
@@ -81,9 +87,9 @@ TABLE = (
     ),
     Plausible(
         "survey.shell_temperature_c",
-        f"{_c(limits.SHELL_C[limits.AMBIENT])}; checks.service heated"
-        f" {_c(limits.SHELL_C[limits.HEATED])}, refrigerated"
-        f" {_c(limits.SHELL_C[limits.REFRIGERATED])}",
+        f"{_celsius_range(limits.SHELL_C[limits.AMBIENT])}; checks.service heated"
+        f" {_celsius_range(limits.SHELL_C[limits.HEATED])}, refrigerated"
+        f" {_celsius_range(limits.SHELL_C[limits.REFRIGERATED])}",
         "degrees Fahrenheit",
         f"checks.air_temperature_c: {limits.SHELL_OVER_AIR_K[0]:g} to"
         f" {limits.SHELL_OVER_AIR_K[1]:+g} K from it",
@@ -91,33 +97,34 @@ TABLE = (
     ),
     Plausible(
         "table.reference_temperature_c",
-        f"{_c(limits.REFERENCE_C[limits.AMBIENT])}; checks.service heated"
-        f" {_c(limits.REFERENCE_C[limits.HEATED])}, refrigerated"
-        f" {_c(limits.REFERENCE_C[limits.REFRIGERATED])}",
+        f"{_celsius_range(limits.REFERENCE_C[limits.AMBIENT])}; checks.service heated"
+        f" {_celsius_range(limits.REFERENCE_C[limits.HEATED])}, refrigerated"
+        f" {_celsius_range(limits.REFERENCE_C[limits.REFRIGERATED])}",
         "degrees Fahrenheit (68, 60, 59)",
         "checks.service",
         ("temperature_strange",),
     ),
     Plausible(
         "checks.air_temperature_c",
-        _c(limits.AIR_C),
+        _celsius_range(limits.AIR_C),
         "degrees Fahrenheit",
         "",
         ("air_temperature_strange",),
     ),
     Plausible(
         "material.expansion_per_k",
-        f"carbon steel {_per_k('carbon_steel')}, stainless {_per_k('stainless_steel')}, aluminium"
-        f" {_per_k('aluminium')}; needed with a shell of another kind than carbon steel",
-        "ten times too small, that of aluminium",
+        f"carbon steel {_expansion_range('carbon_steel')}, stainless"
+        f" {_expansion_range('stainless_steel')}, aluminium"
+        f" {_expansion_range('aluminium')}; needed unless the shell is of carbon steel",
+        "ten times too small, the value of aluminium",
         "checks.shell; blank: carbon steel",
         ("constant_strange", "constant_missing"),
     ),
     Plausible(
         "material.e_gpa",
         "; ".join(f"{name} {low:g} to {high:g} GPa" for name, (low, high) in limits.E_GPA.items())
-        + "; needed under a liquid head with a shell of another kind than carbon steel",
-        "that of another metal",
+        + "; needed under a liquid head unless the shell is of carbon steel",
+        "the modulus of another metal",
         "checks.shell; blank: carbon steel",
         ("constant_strange", "constant_missing"),
     ),
@@ -131,12 +138,12 @@ TABLE = (
         f" stainless {limits.LEAST_STRESS_MPA['stainless_steel']:g}, aluminium"
         f" {limits.LEAST_STRESS_MPA['aluminium']:g})",
         "two or three times too thick or too thin, centimetres",
-        "the head that the plate carries",
+        "the liquid head on the plate",
         ("plate_thick", "plate_thin"),
     ),
     Plausible(
         "courses: their order",
-        f"the top course at most {limits.RISING_PLATES:g} times as thick as the bottom one; no"
+        f"the top course at most {limits.RISING_PLATES:g} times as thick as the bottom course; no"
         f" level ring of points within {1000 * limits.NEAR_JOINT_M:g} mm of a joint",
         "courses from the top down, a wrong height",
         "plates, rings of points.csv",
@@ -151,7 +158,8 @@ TABLE = (
     ),
     Plausible(
         "horizontal.thickness_mm, sphere.thickness_mm",
-        f"lying {_line('horizontal')}; sphere {_line('sphere')}; below {limits.LEAST_PLATE_MM:g} mm"
+        f"horizontal tank {_plate_range('horizontal')}; sphere {_plate_range('sphere')}; below"
+        f" {limits.LEAST_PLATE_MM:g} mm"
         " a problem",
         "ten times too thick or too thin, centimetres",
         "the diameter",
@@ -161,7 +169,7 @@ TABLE = (
         "datum.bottom_z_m",
         f"with the courses {1000 * limits.TOP_MISS_M:g} mm from checks.top_z_m; bottom points near"
         f" the wall within {limits.RIM_MISS_M:g} m; at most {100 * limits.OFF_SHELL:g} % of the"
-        f" points of the wall over {1000 * limits.OFF_SHELL_M:g} mm below the bottom or above the"
+        f" wall points over {1000 * limits.OFF_SHELL_M:g} mm below the bottom or above the"
         " top course",
         "half a metre off",
         "checks.top_z_m, bottom.csv, the points of the wall",
@@ -169,9 +177,9 @@ TABLE = (
     ),
     Plausible(
         "datum.dip_plate_z_m",
-        f"within {limits.DIP_PLATE_M:g} m of the bottom, of a lying tank or a sphere within"
-        f" {limits.DIP_PLATE:g} D, too; with a cone or a dish and the place of the dip point within"
-        f" {limits.PLATE_ON_BOTTOM_M:g} m and half the rise of its surface there",
+        f"within {limits.DIP_PLATE_M:g} m of the bottom, in a horizontal tank or a sphere also"
+        f" within {limits.DIP_PLATE:g} D; on a cone or a dish with a known dip point within"
+        f" {limits.PLATE_ON_BOTTOM_M:g} m and half the rise of the bottom there",
         "half a metre off",
         "the bottom",
         ("dip_plate_far", "dip_plate_off_bottom"),
@@ -181,33 +189,34 @@ TABLE = (
         f"from {limits.REFERENCE_BELOW_M:g} m below the tank's top to {limits.REFERENCE_ABOVE_M:g}"
         f" m + {limits.REFERENCE_ABOVE:g} D above",
         "below the shell's top, feet",
-        "the top of shell or solid",
+        "the top of the tank",
         ("reference_below_top", "reference_far_above"),
     ),
     Plausible(
         "bottom.centre_z_m",
         f"at most {limits.SLOPE_UP:g} of the radius above the edge",
-        "cone up for down",
-        "checks.bottom_slopes (problem), asked for where it is blank; the dip plate",
+        "a cone up for down",
+        "checks.bottom_slopes (problem; requested if blank), the dip plate",
         ("bottom_slopes_otherwise", "bottom_rises_much", "bottom_steep"),
     ),
     Plausible(
         "deadwood.volume_m3",
-        "negative for coils, pipes, columns, stairs, mixers and whatever has another name; positive"
-        " for manholes, doors, domes, sumps; at most a tenth of what the tank holds beside it, all"
-        " of that a problem",
+        "negative for coils, pipes, columns, stairs, mixers and all other names; positive for"
+        " manholes, doors, domes, sumps; at most a tenth of the tank's volume over its height, a"
+        " problem above the whole volume",
         "the wrong sign, litres",
         "the name, in English, Portuguese or Spanish; the tank between bottom_m and top_m",
         ("deadwood_takes", "deadwood_gives", "deadwood_sign_unsaid", "deadwood_large"),
     ),
     Plausible(
         "tank.nominal_diameter_m",
-        f"{100 * limits.SIZE_MISS:g} % + {1000 * limits.SIZE_MISS_M:g} mm from a diameter among the"
-        " sizes; 1 in 500, or checks.diameter_within_mm, and 3 sd from that of a survey by any"
-        " method, of all courses and of each (of points between inside and outside where"
-        f" checks.diameter_is is blank); {100 * limits.IMPOSSIBLE_MISS:g} % is a problem",
+        f"{100 * limits.SIZE_MISS:g} % + {1000 * limits.SIZE_MISS_M:g} mm from a declared"
+        " diameter; 1 in 500, or checks.diameter_within_mm, and 3 standard uncertainties from the"
+        " diameter of any survey, for all courses together and each course (for points between"
+        f" inside and outside if checks.diameter_is is blank); {100 * limits.IMPOSSIBLE_MISS:g} %"
+        " is a problem",
         "radius for diameter, feet, a wrong offset, scale or side",
-        "sizes, inside radii of the survey",
+        "declared sizes, inside radii of the survey",
         (
             *("size_unlike_drawing", "points_unlike_drawing", "points_too_wide"),
             *("course_unlike_drawing", "size_in_other_unit", "wall_unlike_nominal"),
@@ -226,13 +235,13 @@ TABLE = (
     ),
     Plausible(
         "circumferences.reading_m, great_circles.reading_m",
-        f"{100 * limits.IMPOSSIBLE_MISS:g} % from the median of all (great circles 5 %) and from"
-        " the circumference by the drawing, more is a problem; ten times the limit of repeats from"
-        " each other, and from others of a course, a ring or a sphere; a course that stands apart"
-        " 1 in 1000 of the radius from the others, a ring a plate (half of one where laps are"
-        " given) and 1 in 500",
+        f"{100 * limits.IMPOSSIBLE_MISS:g} % from the median of all readings (great circles 5"
+        " %) and from the circumference of the drawing (larger: a problem); ten times the limit"
+        " of repeats between readings of a circumference, and between circumferences of a course,"
+        " ring or sphere; a course 1 in 1000 of the radius from the other courses; a ring a plate"
+        " (half a plate if laps are given) and 1 in 500",
         "feet, a metre misread, transposed digits, a strap over a manhole",
-        "one another, tank.nominal_diameter_m",
+        "each other, tank.nominal_diameter_m",
         (
             *("circle_of_other_size", "repeats_far", "strap_far", "strapped_course_far"),
             *("strap_contradicts_far", "strap_of_ring_far", "circle_contradicts_far", "ring_far"),
@@ -241,16 +250,16 @@ TABLE = (
     ),
     Plausible(
         "offsets.offset_mm",
-        "offsets and their steps from course to course as instruments and plates make them",
+        "offsets and steps between courses typical of instruments and plates",
         "centimetres, the wrong sign or side, levels from the top down",
         "plates, the line's side, circumferences.reading_m",
         ("offsets_small", "lines_of_inside", "lines_turned_about"),
     ),
     Plausible(
         "instruments.toml: certificates of tapes and other instruments",
-        "corrections within what a verification allows; temperatures, pulls and sections of tapes"
-        " that there are; offsets and scales within 3 sd of the certificate where the wall or a"
-        " tape determines them",
+        "corrections within the limits of verification; temperatures, tensions and cross-sections"
+        " of existing tapes; offsets and scales within 3 standard uncertainties of the certificate"
+        " if the wall or a tape determines them",
         "ppm, percent or degrees Fahrenheit, the constant of a prism, another tape",
         "the readings, circumferences.temperature_c, survey.shell_temperature_c",
         (
@@ -272,14 +281,14 @@ TABLE = (
     Plausible(
         "tank.nominal_volume_m3",
         f"{100 * limits.VOLUME_MISS:g} % from the capacity",
-        "whatever moves the volume much",
+        "any error with a large effect on the volume",
         "the capacity",
         ("not_nominal",),
     ),
     Plausible(
         "horizontal.length_m",
         f"{limits.LENGTH_OVER_DIAMETER[0]:g} to {limits.LENGTH_OVER_DIAMETER[1]:g} diameters; over"
-        f" {limits.MOST_LENGTH_OVER_DIAMETER:g} a problem",
+        f" {limits.MOST_LENGTH_OVER_DIAMETER:g}: a problem",
         "decimetres, feet",
         f"the diameter; checks.length_m within {100 * limits.SIZE_MISS:g} % +"
         f" {1000 * limits.SIZE_MISS_M:g} mm",
@@ -287,19 +296,19 @@ TABLE = (
     ),
     Plausible(
         "horizontal.end_a_depth_m, horizontal.end_b_depth_m, top.depth_m",
-        "over the diameter: "
-        + ", ".join(_of_ends(form) for form in limits.END_DEPTH)
-        + "; two ends of one form differ by less than"
+        "as a fraction of the diameter: "
+        + ", ".join(_depth_range(form) for form in limits.END_DEPTH)
+        + "; two ends of equal form differ by less than"
         f" {100 * (limits.ENDS_DIFFER - 1):.0f} % or {1000 * limits.ENDS_DIFFER_M:g} mm",
-        "twice as deep, the dish's radius for its depth",
+        "twice the depth, the dish's radius for its depth",
         "the diameter, the other end",
         ("end_depth_strange", "ends_differ"),
     ),
     Plausible(
-        "horizontal.end_a_dish_radius_m, end_a_knuckle_radius_m and those of end B",
+        "horizontal.end_a_dish_radius_m, end_a_knuckle_radius_m, also of end B",
         f"dish {limits.DISH_RADIUS[0]:g} to {limits.DISH_RADIUS[1]:g}, knuckle"
         f" {limits.KNUCKLE_RADIUS[0]:g} to {limits.KNUCKLE_RADIUS[1]:g} diameters",
-        "radius for diameter, twice as large",
+        "radius for diameter, twice the radius",
         "the diameter, the other end",
         ("end_radius_strange", "ends_differ"),
     ),
@@ -313,7 +322,7 @@ TABLE = (
     Plausible(
         "horizontal.tube_angle_deg",
         f"up to {limits.STRONG_ROLL_DEG:g} degrees",
-        "the angle against the horizontal",
+        "the angle from the horizontal",
         "",
         ("large_roll",),
     ),
@@ -326,7 +335,7 @@ TABLE = (
     ),
     Plausible(
         "roof.mass_kg",
-        f"{limits.ROOF_KG_M2[0]:g} to {limits.ROOF_KG_M2[1]:g} kg for a square metre of the tank",
+        f"{limits.ROOF_KG_M2[0]:g} to {limits.ROOF_KG_M2[1]:g} kg per square metre of the tank",
         "tonnes",
         "tank.nominal_diameter_m",
         ("roof_mass_strange",),
@@ -339,17 +348,17 @@ TABLE = (
         ("strange_density",),
     ),
     Plausible(
-        "points of a lying cylinder or a sphere",
+        "points of a horizontal cylinder or a sphere",
         f"residuals (rms) up to {100 * limits.MISFIT:g} % of the diameter +"
-        f" {1000 * limits.MISFIT_M:g} mm, and {limits.MISFIT_SDS:g} times their given sd; over"
-        f" {100 * limits.IMPOSSIBLE_MISFIT:g} % a problem",
-        "one axis in another unit, points of something else",
+        f" {1000 * limits.MISFIT_M:g} mm, and {limits.MISFIT_SDS:g} times their declared"
+        f" standard deviation; over {100 * limits.IMPOSSIBLE_MISFIT:g} %: a problem",
+        "one axis in another unit, points of another object",
         "the fitted shape",
         ("points_misfit", "points_beyond_sd", "points_make_no_shape"),
     ),
     Plausible(
         "survey.side",
-        "set-ups and photographs on that side of the wall, be it of a vertical tank, a lying"
+        "set-ups and photographs on that side of the wall of a vertical tank, a horizontal"
         " cylinder or a sphere (problem)",
         "inside for outside",
         "the adjusted stations",
@@ -357,58 +366,60 @@ TABLE = (
     ),
     Plausible(
         "checks.diameter_is",
-        f"with it the inside diameter (of the first course) within {100 * limits.DRAWN_MISS:g} % +"
-        f" {1000 * limits.DRAWN_MISS_M:g} mm + {limits.CIRCUMFERENCE_SDS:g} sd of the drawing's;"
-        f" not {limits.OTHER_SIDE[0]:g} to {limits.OTHER_SIDE[1]:g} times two plates off, the way"
-        " that the other side explains, where two plates are over"
-        f" {2e6 * limits.CIRCUMFERENCE_MISS:g} ppm of D + 6 sd",
+        "if given, the inside diameter (of the first course) differs from the drawing by at most"
+        f" {100 * limits.DRAWN_MISS:g} % + {1000 * limits.DRAWN_MISS_M:g} mm +"
+        f" {limits.CIRCUMFERENCE_SDS:g} standard uncertainties, and not by"
+        f" {limits.OTHER_SIDE[0]:g} to {limits.OTHER_SIDE[1]:g} times two plates in the direction"
+        " explained by the other side (tested if two plates are over"
+        f" {2e6 * limits.CIRCUMFERENCE_MISS:g} ppm of D + 6 standard uncertainties)",
         "inside for outside, plates two times off",
         "tank.nominal_diameter_m, plates and paint, survey.side",
         ("side_doubtful", "inside_unlike_drawing"),
     ),
     Plausible(
         "checks.circumference_m",
-        f"{1e6 * limits.CIRCUMFERENCE_MISS:g} ppm and {limits.CIRCUMFERENCE_SDS:g} sd from that of"
-        " the points",
+        f"{1e6 * limits.CIRCUMFERENCE_MISS:g} ppm and {limits.CIRCUMFERENCE_SDS:g} standard"
+        " uncertainties from the circumference of the points",
         "inside for outside, a wrong scale, feet",
-        "the first course, outside, plate and paint added where it was surveyed inside",
+        "the outside of the first course; plate and paint are added to an inside survey",
         ("circumference_off",),
     ),
     Plausible(
         "check readings, distances between control points, bases by stadia",
-        "4 sd; no base is rejected",
+        "4 standard deviations; no base is rejected",
         "slope distances 0.1 % too long, the length of another bar",
         "the adjusted survey",
         ("check_reading_off", "check_point_off", "control_scale", "base_rejected"),
     ),
     Plausible(
         "liquid.csv: meter_temperature_c, tank_temperature_c, shell_temperature_c",
-        f"{_c(limits.LIQUID_C[limits.AMBIENT])}; checks.service heated"
-        f" {_c(limits.LIQUID_C[limits.HEATED])}, refrigerated"
-        f" {_c(limits.LIQUID_C[limits.REFRIGERATED])}; meter within {limits.METER_OVER_TANK_K:g} K"
-        f" of the liquid in the tank, shell within {limits.SHELL_OVER_LIQUID_K:g} K",
+        f"{_celsius_range(limits.LIQUID_C[limits.AMBIENT])}; checks.service heated"
+        f" {_celsius_range(limits.LIQUID_C[limits.HEATED])}, refrigerated"
+        f" {_celsius_range(limits.LIQUID_C[limits.REFRIGERATED])}; meter within"
+        f" {limits.METER_OVER_TANK_K:g} K of the liquid in the tank, shell within"
+        f" {limits.SHELL_OVER_LIQUID_K:g} K of it",
         "degrees Fahrenheit, columns exchanged",
-        "one another",
+        "each other",
         ("metered_temperature_strange", "temperatures_far_apart"),
     ),
     Plausible(
         "liquid.tank_temperature_c",
-        f"from dip to dip within {limits.TANK_C_STEP_K:g} K",
-        "liquid in layers, read at one height",
-        "the dip before it",
+        f"within {limits.TANK_C_STEP_K:g} K between successive dips",
+        "stratified liquid, read at a single height",
+        "the previous dip",
         ("tank_temperature_jumps",),
         verified=False,
     ),
     Plausible(
         "liquid.expansion_per_k",
         f"{limits.LIQUID_EXPANSION_PER_K[0]:g} to {limits.LIQUID_EXPANSION_PER_K[1]:g} 1/K",
-        "that of the shell, ten times too small",
+        "the coefficient of the shell, ten times too small",
         "",
         ("liquid_expands_strangely",),
     ),
     Plausible(
         "meters.toml: factor_after",
-        f"within {100 * limits.METER_DRIFT:g} % of the factor before, at most"
+        f"within {100 * limits.METER_DRIFT:g} % of the previous factor, at most"
         f" {100 * limits.MUCH_METER_DRIFT:g} %",
         "a meter that changed",
         "factor",
@@ -416,35 +427,35 @@ TABLE = (
         verified=False,
     ),
     Plausible(
-        "control.csv: x_m, y_m of stations of untied set-ups of hits",
-        "given to 0.3 m where no course is strapped",
-        "stations that were left blank and assumed to be evenly spaced",
+        "control.csv: x_m, y_m of set-ups of hits without ties",
+        "stated within 0.3 m if no course is strapped",
+        "blank stations, which are assumed evenly spaced",
         "",
         ("places_assumed",),
     ),
     Plausible(
         "clouds.toml: s_translation_mm, s_rotation_arcsec",
-        "pairs of scans no further apart than these and the scanners allow (0.1 %), all overlaps"
-        " together as well (1 %)",
-        "a scan that moved, a registration worse than declared",
+        "pairs of scans agree within these values and the scanner's (significance 0.1 %), and so"
+        " do all overlaps together (1 %)",
+        "a displaced scan, a registration worse than declared",
         "the overlaps of the scans",
         ("scans_apart", "registration_beyond"),
     ),
     Plausible(
         "liquid.flow_m3_h",
-        "within the range that the meter was proved for",
-        "litres per minute, a valve hardly open",
+        "within the flow range of the meter proving",
+        "litres per minute, a nearly closed valve",
         "flow_min_m3_h, flow_max_m3_h of meters.toml",
         ("flow_out_of_range",),
         verified=False,
     ),
     Plausible(
         "liquid.volume_m3",
-        f"standard deviation of a batch by its meter at most {100 * limits.BATCH_SD:g} % of it;"
-        " well above a bottom and well within a lying tank 0.7 to 1.4 times what the nominal sizes"
-        " hold between its dips, most of them over 5 or under 0.2 times a problem; no cause of"
-        " liquid and geometry beyond 6.6 sd",
-        "litres, gallons, barrels, a batch missing, a valve that passes, a dip misread",
+        f"standard deviation of a batch by its meter at most {100 * limits.BATCH_SD:g} % of the"
+        " batch; well above the bottom, or well within a horizontal tank, 0.7 to 1.4 times the"
+        " nominal volume between its dips (most batches over 5 or under 0.2 times: a problem); no"
+        " cause of a discrepancy between liquid and geometry beyond 6.6 standard deviations",
+        "litres, gallons, barrels, a missing batch, a leaking valve, a misread dip",
         "meters.toml, nominal sizes",
         ("batch_too_small", "batch_unlike_sizes", "batches_in_other_unit", "liquid_far_because"),
     ),

@@ -159,7 +159,7 @@ ROWS_OF_VERTICAL = [
     ("bottom", [(1.0, 2.0, 0.0)] * 12, None, "x_m", "in one place or on one line"),
     ("bottom", [(x / 5, x / 3, 0.0) for x in range(12)], None, "x_m", "on one line"),
     ("bottom", [*RINGS, (7.5, 0.0, 0.0)], 19, "x_m", "a radius of 6.5 m"),
-    ("bottom", [*RINGS, (0.0, 0.0, -0.1)], 19, "x_m", "the same x and y as row 2"),
+    ("bottom", [*RINGS, (0.0, 0.0, -0.1)], 19, "x_m", "x and y of row 2 again"),
     ("bottom", [*RINGS, (1.0, 1.0, 1.5)], 19, "z_m", "1.5 m above datum.bottom_z_m"),
     ("bottom", [*RINGS, (1.0, 1.0, -13.5)], 19, "z_m", "13.5 m below datum.bottom_z_m"),
     ("bottom", [(1e3 * x, 1e3 * y, z) for x, y, z in RINGS], None, "x_m", "in millimetres"),
@@ -296,7 +296,7 @@ SETTINGS_OF_KINDS = [
         "horizontal.end_a_dish_radius_m",
         "only for a torispherical",
     ),
-    ("horizontal", {"horizontal.tilt_mm_per_m": 5.0}, "horizontal.dip_from_a_m", "leans"),
+    ("horizontal", {"horizontal.tilt_mm_per_m": 5.0}, "horizontal.dip_from_a_m", "is tilted"),
     ("horizontal", {"horizontal.tilt_mm_per_m": 300.0}, "horizontal.tilt_mm_per_m", "200"),
     ("horizontal", {"horizontal.dip_from_a_m": 10.1}, "horizontal.dip_from_a_m", "0 to 10 m"),
     (

@@ -1,7 +1,7 @@
-"""The closed lists of a job: every key of job.toml and every column of its tables.
+"""Complete lists of the keys of job.toml and of the columns of the tables of a job.
 
-A table of the tank has a module of its own, with its columns and its checks. The starter job and
-the tables of `docs/job-format.md` (`make job-format`) are written from these lists.
+Each table of the tank has a module with its columns and its checks. The starter job and the tables
+of `docs/job-format.md` (`make job-format`) are generated from these lists.
 """
 
 from tankcal.job.contract import (
@@ -47,7 +47,7 @@ SECTIONS = (
     "csv",
 )
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
-COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES}
+COLUMNS = {table.__name__.rpartition(".")[2]: table.COLUMNS for table in _TABLES}
 COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | tangents.COLUMNS | stadia.COLUMNS
 COLUMNS |= great_circles.COLUMNS | clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS
 COLUMNS |= rings.COLUMNS | SURVEY_COLUMNS | overrulings.COLUMNS
@@ -66,38 +66,38 @@ SURVEYS = ADJUSTED_SURVEYS | {
     "radii": tuple(radii.COLUMNS),
 }
 
-SURVEYS_OF_KIND = {  # with other tables than those of SURVEYS
+SURVEYS_OF_KIND = {  # surveys whose tables for a kind of tank differ from SURVEYS
     "horizontal": {"strapping": (*strapping.COLUMNS, *rings.COLUMNS)},
     "sphere": {"strapping": (*great_circles.COLUMNS, *great_circles.BESIDE)},
 }
 
 
 def tables_of_survey(kind, survey):
-    """Names of the tables of a survey of a kind of tank."""
+    """Return the names of the tables of a survey for a kind of tank."""
     return SURVEYS_OF_KIND.get(kind, {}).get(survey, SURVEYS[survey])
 
 
 REQUIRED_TABLES = {"vertical": ("points", "courses")}
-_OF_ALL = ("uncertainty", "correlations", "stated")
-_OF_SEARCHED = (*_OF_ALL, "overrulings")  # kinds of tank whose points are searched for blunders
+_COMMON_TABLES = ("uncertainty", "correlations", "stated")
+_TESTED_TABLES = (*_COMMON_TABLES, "overrulings")  # of kinds with an outlier test of the points
 TABLES_OF_KIND = {
-    "vertical": ("points", "courses", "welds", "bottom", "deadwood", *_OF_SEARCHED),
-    "horizontal": ("points", "deadwood", *_OF_SEARCHED),
-    "sphere": ("points", "deadwood", *_OF_SEARCHED),
-    "mesh": ("deadwood", *_OF_ALL),
+    "vertical": ("points", "courses", "welds", "bottom", "deadwood", *_TESTED_TABLES),
+    "horizontal": ("points", "deadwood", *_TESTED_TABLES),
+    "sphere": ("points", "deadwood", *_TESTED_TABLES),
+    "mesh": ("deadwood", *_COMMON_TABLES),
 }
 
 for _group, _owners in {"keys": KEYS, "columns": COLUMNS, "entries": REGISTER_KEYS}.items():
-    for _owner, _fields in _owners.items():  # so that a message says a note in its language
+    for _owner, _fields in _owners.items():  # translates the notes quoted in messages
         NOTES.update({field.note: (_group, f"{_owner}.{field.name}") for field in _fields})
 
 
 def columns_of(table, kind="vertical"):
-    """The `Field`s of a table of a tank of a kind (None, not known: vertical)."""
+    """Return the `Field`s of a table for a kind of tank (None, unknown kind: vertical)."""
     return tuple(field for field in COLUMNS[table] if field.suits(kind or "vertical"))
 
 
-OPEN_SECTIONS = ("certificate",)  # hold text fields of the user's own, too
+OPEN_SECTIONS = ("certificate",)  # sections that may also contain text fields of the user
 
 __all__ = [
     "COLUMNS",

@@ -1,4 +1,4 @@
-"""[bottom] and bottom.csv: keys and columns; one form, complete, in the tank, in metres."""
+"""Keys of [bottom], columns of bottom.csv, and checks that the bottom is complete and plausible."""
 
 import numpy as np
 
@@ -10,13 +10,13 @@ from tankcal.job.fields import Field
 from tankcal.messages import message
 from tankcal.tank.tips import FORMS as TIPS
 
-OF_CLOUD = "cloud"  # the form that scans of the job show
+OF_CLOUD = "cloud"  # form of a bottom that is modelled from scans
 SHAPED = tuple(TIPS)
 KEYS = (
     choice(
         "form",
-        "form of the bottom; cloud: as scans from inside show it; blank: flat, or points or liquid"
-        " when bottom.csv has their columns",
+        "form of the bottom; cloud: from scans of the inside; blank: points or liquid if"
+        " bottom.csv has their columns, else flat",
         ("flat", "leaning", *SHAPED, "points", "liquid", OF_CLOUD),
         kinds=VERTICAL,
     ),
@@ -33,7 +33,7 @@ KEYS = (
 
 
 def _bottom(name, note, low, high, above_low=False):
-    """An optional column of bottom.csv, filled in for every row or for none."""
+    """Return an optional column of bottom.csv, filled in for every row or for none."""
     return Field(name, "number", note, in_full=True, low=low, high=high, above_low=above_low)
 
 
@@ -42,35 +42,49 @@ COLUMNS = (
     _bottom("y_m", "surveyed bottom: coordinate y, in the frame of the points, metres", -1e8, 1e8),
     _bottom("z_m", "surveyed bottom: coordinate z, in the frame of the points, metres", -1e5, 1e5),
     _bottom("s_mm", "surveyed bottom: standard deviation of z, millimetres", 0, 1000, True),
-    _bottom("level_m", "or measured by liquid: dip from the table's zero, metres", -100, 100),
-    _bottom("volume_m3", "measured by liquid: volume below that dip, cubic metres", 0, 1e6),
-    _bottom("u_m3", "measured by liquid: its standard uncertainty, cubic metres", 0, 1e5),
+    _bottom("level_m", "bottom measured with liquid: dip from the table's zero, metres", -100, 100),
+    _bottom(
+        "volume_m3", "bottom measured with liquid: volume below that dip, cubic metres", 0, 1e6
+    ),
+    _bottom(
+        "u_m3",
+        "bottom measured with liquid: standard uncertainty of the volume, cubic metres",
+        0,
+        1e5,
+    ),
 )
 
 SURVEYED, MEASURED = ("x_m", "y_m", "z_m"), ("level_m", "volume_m3")
-MIN_POINTS, MAX_POINTS = 12, 500  # that a surface is made through
-MIN_LEVELS = 2
-NARROW, PARTIAL = 0.01, 0.1  # spread (rms) over the diameter; that of a full disc is 0.25
-OUTSIDE_FACTOR, OUTSIDE_M = 1.05, 0.2  # of the nominal radius, which is not the real one
-RISE_FACTOR, STEEP_FACTOR, LEAST_DEPTH_M = 0.1, 0.1, 0.5  # of the diameter
-DEEPEST = {"cone": 5.0, "dish": 0.5, "ellipsoidal": 2.0, "torispherical": 0.5}  # the same
-OVERFULL, EMPTY = 1.5, 0.5  # volume of a slice over that of the full cross-section
+MIN_POINTS, MAX_POINTS = 12, 500  # number of points of a surveyed bottom surface
+MIN_LEVELS = 2  # number of levels of a bottom measured with liquid
+# Spread (rms) of the points over the diameter; a full disc has 0.25.
+NARROW, PARTIAL = 0.01, 0.1
+# Tolerance of the distance from the axis: factor of the nominal radius, and metres, because the
+# actual radius differs from the nominal radius.
+OUTSIDE_FACTOR, OUTSIDE_M = 1.05, 0.2
+# Largest rise and largest usual depth of the bottom over the diameter; metres always permitted.
+RISE_FACTOR, STEEP_FACTOR, LEAST_DEPTH_M = 0.1, 0.1, 0.5
+# Largest depth of a head over the diameter.
+DEEPEST = {"cone": 5.0, "dish": 0.5, "ellipsoidal": 2.0, "torispherical": 0.5}
+# Volume of a slice over the volume of the full cross-section: problem above, warning below.
+OVERFULL, EMPTY = 1.5, 0.5
 
 
 def bottom_form(values, table):
-    """The form of the bottom: as given, else by the columns of bottom.csv, else flat."""
+    """Return the declared form of the bottom, else the form of the columns of bottom.csv."""
     form = values["bottom"]["form"]
     if form is not None or not has_rows(table):
         return form or "flat"
-    return "liquid" if _given(table, MEASURED) else "points"
+    return "liquid" if _filled_columns(table, MEASURED) else "points"
 
 
-def _given(table, names):
+def _filled_columns(table, names):
+    """Return the names of those columns that are filled in."""
     return [name for name in names if table.columns[name] is not None]
 
 
 def check_bottom(values, table, points, extent, raw, log):
-    """The form with what belongs to it, and nothing that belongs to another one."""
+    """Check the keys and rows of the form of the bottom, and refuse those of other forms."""
     form = bottom_form(values, table)
     _check_centre(form, values, raw, log)
     if form not in ("points", "liquid"):
@@ -83,25 +97,28 @@ def check_bottom(values, table, points, extent, raw, log):
             )
             log.problem(table.file, expected)
         return
-    wanted = SURVEYED if form == "points" else MEASURED
+    required = SURVEYED if form == "points" else MEASURED
     if not has_rows(table):
         expected = message(
             "bottom_rows_missing",
-            "no rows; expected {wanted}, as bottom.form = {form} says",
-            wanted=[*wanted],
+            "no rows; expected {wanted} for bottom.form = {form}",
+            wanted=[*required],
             form=form,
         )
         log.problem(raw.file_of("bottom"), expected)
-    elif _has_its_columns(table, form, wanted, log):
+    elif _has_required_columns(table, form, required, log):
         if form == "points":
             _check_points(table, points, values, log)
         else:
             _check_volumes(table, values, extent, log)
 
 
-def _has_its_columns(table, form, wanted, log):
-    """Has the table all columns of its form, and none of the other one?"""
-    surveyed, measured = _given(table, (*SURVEYED, "s_mm")), _given(table, (*MEASURED, "u_m3"))
+def _has_required_columns(table, form, required, log):
+    """Check that the table has all columns of its form and none of the other form."""
+    surveyed, measured = (
+        _filled_columns(table, (*SURVEYED, "s_mm")),
+        _filled_columns(table, (*MEASURED, "u_m3")),
+    )
     if surveyed and measured:
         expected = message(
             "bottom_of_two_forms",
@@ -111,12 +128,12 @@ def _has_its_columns(table, form, wanted, log):
         )
         log.problem(table.file, expected, None, surveyed[0])
         return False
-    missing = [name for name in wanted if table.columns[name] is None]
+    missing = [name for name in required if table.columns[name] is None]
     for name in missing:
         expected = message(
             "bottom_column_missing",
             "not given; expected {wanted} for a bottom of form {form}",
-            wanted=[*wanted],
+            wanted=[*required],
             form=form,
         )
         log.problem(table.file, expected, None, name)
@@ -124,7 +141,7 @@ def _has_its_columns(table, form, wanted, log):
 
 
 def rise_of_bottom(values):
-    """How far the centre of a shaped bottom lies above its edge, m; None: that is not known."""
+    """Return the height of a shaped bottom's centre above its edge, m; None if unknown."""
     given, diameter = values["bottom"], values["tank"]["nominal_diameter_m"]
     if given["centre_z_m"] is not None:
         edge = values["datum"]["bottom_z_m"]
@@ -134,6 +151,7 @@ def rise_of_bottom(values):
 
 
 def _check_centre(form, values, raw, log):
+    """Check that the height and radii of the centre are given only for shaped bottoms."""
     given, edge = values["bottom"], values["datum"]["bottom_z_m"]
     centre = given["centre_z_m"]
     diameter = values["tank"]["nominal_diameter_m"]
@@ -161,6 +179,7 @@ def _check_centre(form, values, raw, log):
 
 
 def _check_rise(form, rise, diameter, height, raw, log):
+    """Check the height of the centre above the edge, m, against diameter and height of the tank."""
     deepest = DEEPEST[form] * diameter
     highest = deepest if height is None else min(deepest, height)
     if not -deepest <= rise <= highest:
@@ -189,6 +208,7 @@ def _check_rise(form, rise, diameter, height, raw, log):
 
 
 def _check_points(table, wall, values, log):
+    """Check number, extent, place and depth of the points of a surveyed bottom."""
     xyz, diameter = places_of(table), values["tank"]["nominal_diameter_m"]
     if len(table.rows) + table.skipped < MIN_POINTS:
         expected = message(
@@ -210,6 +230,7 @@ def _check_points(table, wall, values, log):
     if not len(xyz) or len(xyz) < len(table.rows) or diameter is None:
         return
     plan = xyz[:, :2] - xyz[:, :2].mean(axis=0)
+    # The smaller singular value is the rms extent of the points in their narrowest direction.
     spread = float(np.linalg.svd(plan, compute_uv=False)[1] / np.sqrt(len(xyz)))
     if spread < NARROW * diameter:
         expected = message(
@@ -232,12 +253,13 @@ def _check_points(table, wall, values, log):
 
 
 def _refuse_same_places(table, xyz, log):
+    """Refuse points with equal x and y, through which no surface can be fitted."""
     first_row = {}
     for row, place in zip(table.rows, map(tuple, xyz[:, :2]), strict=True):
         if place in first_row:
             expected = message(
                 "bottom_point_twice",
-                "the same x and y as row {first_row}; expected one point there",
+                "x and y of row {first_row} again; expected one point at each place",
                 first_row=first_row[place],
             )
             log.problem(table.file, expected, row, "x_m")
@@ -245,13 +267,14 @@ def _refuse_same_places(table, xyz, log):
 
 
 def _check_places(table, xyz, wall, diameter, log):
-    """Bottom points within the tank; its axis is about where most wall points centre."""
+    """Check that the bottom points lie within the tank (axis estimated from wall points)."""
     if not len(wall):
         return
+    # The percentiles exclude outliers of the wall.
     low, high = np.percentile(wall[:, :2], [5, 95], axis=0)
     distance = np.hypot(*(xyz[:, :2] - (low + high) / 2).T)
     allowed = OUTSIDE_FACTOR * diameter / 2 + OUTSIDE_M
-    if np.min(high - low) < 0.85 * diameter:  # not seen from all around: the centre is vague
+    if np.min(high - low) < 0.85 * diameter:  # wall seen from one side: centre poorly known
         allowed = diameter + OUTSIDE_M
     radius = diameter / 2
     texts = [
@@ -267,6 +290,7 @@ def _check_places(table, xyz, wall, diameter, log):
 
 
 def _check_depths(table, rise, diameter, log):
+    """Check the heights of the bottom points above the edge, m, against the diameter."""
     highest = max(LEAST_DEPTH_M, RISE_FACTOR * diameter)
     deepest = max(LEAST_DEPTH_M, diameter)
     texts = [_off_edge(z, highest, deepest) for z in rise]
@@ -283,6 +307,7 @@ def _check_depths(table, rise, diameter, log):
 
 
 def _off_edge(z, highest, deepest):
+    """Return the message for a point too high above or too deep below the edge."""
     if z > 0:
         return message(
             "bottom_point_high",
@@ -304,7 +329,7 @@ def _off_edge(z, highest, deepest):
 
 
 def _tell_rows(table, column, bad, texts, log):
-    """A problem for each bad row, or one for the column where more than half of the rows are."""
+    """Report a problem for each bad row, or for the column if more than half are bad."""
     if 2 * np.sum(bad) > len(bad):
         first = texts[int(np.argmax(bad))]
         expected = message(
@@ -320,6 +345,7 @@ def _tell_rows(table, column, bad, texts, log):
 
 
 def _check_volumes(table, values, extent, log):
+    """Check levels and volumes of a bottom measured with liquid."""
     levels, volumes = table.of("level_m"), table.of("volume_m3")
     if len(table.rows) + table.skipped < MIN_LEVELS:
         log.problem(
@@ -334,7 +360,7 @@ def _check_volumes(table, values, extent, log):
         return
     if None in levels or None in volumes or table.skipped:
         return
-    sound = True
+    is_ascending = True
     for name, column in (("level_m", levels), ("volume_m3", volumes)):
         pairs = zip(table.rows[1:], column[:-1], column[1:], strict=True)
         for row, before, after in pairs:
@@ -347,14 +373,14 @@ def _check_volumes(table, values, extent, log):
                     before=before,
                 )
                 log.problem(table.file, expected, row, name)
-                sound = False
-    if sound:
+                is_ascending = False
+    if is_ascending:
         _check_reach(table, levels, volumes, values, extent, log)
         _check_slices(table, levels, volumes, extent, log)
 
 
 def _check_reach(table, levels, volumes, values, extent, log):
-    """Rows from the table's zero up to the shell at least, so that nothing is extrapolated."""
+    """Check that the levels extend from the table's zero to the shell, without extrapolation."""
     shell, zero = values["datum"]["bottom_z_m"], zero_z(values)
     if levels[0] > 0 and volumes[0] > 0:
         expected = message(
@@ -381,6 +407,7 @@ def _check_reach(table, levels, volumes, values, extent, log):
 
 
 def _check_slices(table, levels, volumes, extent, log):
+    """Check the volumes between successive levels against the full cross-section."""
     if extent.area_m2 is None:
         return
     full = extent.area_m2 * np.diff(levels)

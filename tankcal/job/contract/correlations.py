@@ -1,4 +1,4 @@
-"""correlations.csv: its columns; pairs of declared inputs, each once, and possible together."""
+"""Columns of correlations.csv, and checks of its pairs of declared inputs."""
 
 from tankcal.gum.distributions import Normal
 from tankcal.job.contract.shorthand import choice, number
@@ -6,25 +6,34 @@ from tankcal.job.contract.uncertainty import INPUTS
 from tankcal.messages import message
 from tankcal.uncertainty import Input, Inputs
 
-CORRELATED = tuple(name for name, one in INPUTS.items() if one.correlates)
+CORRELATED = tuple(name for name, declarable in INPUTS.items() if declarable.correlates)
 
 COLUMNS = (
     choice("input", "an input of uncertainty.csv", CORRELATED, required=True),
-    choice("with", "another one, correlated with it", CORRELATED, required=True),
-    number("r", "their coefficient of correlation", -1, 1, required=True),
+    choice("with", "another input, correlated with the first", CORRELATED, required=True),
+    number("r", "coefficient of correlation of the two inputs", -1, 1, required=True),
 )
 
 
 def check_correlations(table, inputs, raw, log):
-    """Pairs of inputs of uncertainty.csv, each once, whose coefficients can hold together.
+    """Check that each pair is declared once and that the correlation matrix is valid.
 
-    inputs  uncertainty.csv, or None: not there or unreadable
+    Parameters
+    ----------
+    table : ColumnValues
+        Rows of correlations.csv.
+    inputs : ColumnValues or None
+        Rows of uncertainty.csv; None if missing or unreadable.
+    raw, log
+        Raw job, and log of its problems.
     """
     before = len(log.problems)
     known = _declared(inputs, raw)
     pairs, first_row = {}, {}
-    for row, one, other, r in zip(table.rows, *map(table.of, ("input", "with", "r")), strict=True):
-        for column, name in (("input", one), ("with", other)):
+    for row, first, second, r in zip(
+        table.rows, *map(table.of, ("input", "with", "r")), strict=True
+    ):
+        for column, name in (("input", first), ("with", second)):
             if None not in (known, name) and name not in known:
                 expected = message(
                     "correlation_unknown",
@@ -33,29 +42,29 @@ def check_correlations(table, inputs, raw, log):
                     of=raw.file_of("uncertainty"),
                 )
                 log.problem(table.file, expected, row, column)
-        if one is not None and one == other:
+        if first is not None and first == second:
             expected = message(
-                "correlation_with_itself", "found {one} again; expected another input", one=one
+                "correlation_with_itself", "found {one} again; expected another input", one=first
             )
             log.problem(table.file, expected, row, "with")
-        pair = frozenset((one, other))
+        pair = frozenset((first, second))
         if None not in pair and pair in first_row:
             expected = message(
                 "correlation_twice",
                 "{one} and {other} are already in row {first_row}; expected once",
-                one=one,
-                other=other,
+                one=first,
+                other=second,
                 first_row=first_row[pair],
             )
             log.problem(table.file, expected, row, "with")
         first_row.setdefault(pair, row)
-        pairs[one, other] = r
+        pairs[first, second] = r
     if len(log.problems) == before and not (table.skipped or None in _flat(pairs)):
         _check_together(table, pairs, log)
 
 
 def _declared(inputs, raw):
-    """Names of the declared inputs; None where some of them could not be read."""
+    """Return the names of the declared inputs; None if some of them could not be read."""
     if inputs is None:
         is_there = "uncertainty" in raw.tables
         return None if is_there else ()
@@ -64,11 +73,12 @@ def _declared(inputs, raw):
 
 
 def _flat(pairs):
+    """Return the names and coefficients of all pairs in a list."""
     return [*(name for pair in pairs for name in pair), *pairs.values()]
 
 
 def _check_together(table, pairs, log):
-    """Is the matrix of all coefficients positive semidefinite?"""
+    """Check that the matrix of all coefficients is positive semidefinite."""
     names = dict.fromkeys(name for pair in pairs for name in pair)
     try:
         Inputs([Input(name, Normal(1.0)) for name in names], pairs)

@@ -1,4 +1,4 @@
-"""courses.csv: its columns; names, plates, and heights that add up to the shell's."""
+"""Columns of courses.csv, and checks of its names, plates and heights."""
 
 import numpy as np
 
@@ -14,17 +14,18 @@ COLUMNS = (
     number("paint_mm", "paint thickness, millimetres; blank: 0", 0, 10),
 )
 
+# Largest difference of the sum of the heights from the nominal height: metres, or relative.
 HEIGHT_MISS_M, HEIGHT_MISS_RELATIVE = 0.020, 0.002
-SMALLEST_THICKNESS_MM = 1.0
+SMALLEST_THICKNESS_MM = 1.0  # a thinner plate is assumed to be in metres
 
 
 def no_courses():
-    """What is said of a courses.csv without rows."""
+    """Return the message for a courses.csv without rows."""
     return message("no_courses", "no rows; expected one row for each course, from the bottom up")
 
 
 def thin_plate(thickness_mm):
-    """What is said of a plate that looks as if it were in metres."""
+    """Return the message for a plate that appears to be in metres."""
     return message(
         "thin_plate",
         "found {thickness:g}; expected millimetres, 0 or at least 1: is it in metres?",
@@ -33,7 +34,7 @@ def thin_plate(thickness_mm):
 
 
 def check_courses(courses, values, log):
-    """Course names once; plates of a credible thickness; heights that add up to the shell's."""
+    """Check that names are unique, plates plausible, and the heights add up to the shell height."""
     if courses.is_empty:
         log.problem(courses.file, no_courses())
         return
@@ -43,7 +44,7 @@ def check_courses(courses, values, log):
             log.problem(courses.file, thin_plate(thickness), row, "thickness_mm")
     heights, nominal = courses.of("height_m"), values["tank"]["nominal_height_m"]
     if None in heights or courses.skipped:
-        return  # a course that cannot be read is told already
+        return  # unreadable courses are reported elsewhere
     _refuse_weightless_plates(courses, heights, values, log)
     if nominal is None:
         return
@@ -63,7 +64,7 @@ def check_courses(courses, values, log):
 
 
 def _refuse_weightless_plates(courses, heights, values, log):
-    """A shell that liquid stretches needs its plates: all of them, or those below that liquid."""
+    """Refuse plates of zero thickness below the liquid that stretches the shell."""
     level, zero = values["survey"]["liquid_level_m"], zero_z(values)
     loaded_to, why = -np.inf, ""
     if level and zero is not None and values["corrections"]["head"] is not False:

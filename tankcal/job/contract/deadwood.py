@@ -1,4 +1,4 @@
-"""deadwood.csv: its columns; things in the tank, of a size that fits, with the right sign."""
+"""Columns of deadwood.csv, and checks of place, size and sign of the items."""
 
 import re
 
@@ -9,36 +9,41 @@ from tankcal.job.plausibility import GIVES_ROOM, TAKES_ROOM
 from tankcal.messages import message
 
 COLUMNS = (
-    Field("name", "name", "name of the thing, once in the file", required=True),
+    Field("name", "name", "name of the item, unique in the file", required=True),
     number(
         "bottom_m",
-        "dip of its lowest point, from the table's zero, metres",
+        "dip of the lowest point of the item, from the table's zero, metres",
         -100,
         100,
         required=True,
     ),
     number(
-        "top_m", "dip of its highest point, from the table's zero, metres", -100, 100, required=True
+        "top_m",
+        "dip of the highest point of the item, from the table's zero, metres",
+        -100,
+        100,
+        required=True,
     ),
     number(
         "volume_m3",
-        "its volume, cubic metres: negative takes room (a pipe), positive gives room (a manhole)",
+        "volume of the item, cubic metres: negative if it reduces the capacity (a pipe),"
+        " positive if it adds to it (a manhole)",
         -1e6,
         1e6,
         required=True,
     ),
-    number("u_m3", "standard uncertainty of its volume, cubic metres", 0, 1e5),
+    number("u_m3", "standard uncertainty of the volume, cubic metres", 0, 1e5),
 )
 
-TOLERANCE_M = 0.05  # by which a thing may stick out of the drawing's tank
-LEAST_HEIGHT_M = 0.05  # of a thing that is given as if it had none
-SUMP_M = 2.0  # what gives room may lie below the bottom
-LARGE_SHARE = 0.1  # of what the tank holds beside it
-SLACK = 1.05  # the drawing's cross-section is not the real one
+TOLERANCE_M = 0.05  # permitted protrusion of an item from the nominal tank
+LEAST_HEIGHT_M = 0.05  # height assumed for an item of zero height
+SUMP_M = 2.0  # permitted depth below the bottom of an item that adds to the capacity
+LARGE_SHARE = 0.1  # volume of an item over that of the tank at its height; warning above
+SLACK = 1.05  # tolerance of the nominal cross-section
 
 
 def check_deadwood(table, extent, log):
-    """Names once; bottom below top, both in the tank; a volume that its slice can hold."""
+    """Check that names are unique, and place, volume and sign of each item plausible."""
     refuse_repeated(table, "name", log)
     columns = (table.of(name) for name in ("name", "bottom_m", "top_m", "volume_m3", "u_m3"))
     for row, name, bottom, top, volume, u in zip(table.rows, *columns, strict=True):
@@ -70,29 +75,29 @@ def check_deadwood(table, extent, log):
 
 
 def _check_sign(table, row, name, volume, log):
-    """What gives room says so by its name; what takes it is negative."""
-    takes, gives = (_is_of(name, words) for words in (TAKES_ROOM, GIVES_ROOM))
+    """Check that the sign of the volume agrees with the name of the item."""
+    takes, gives = (_has_word(name, words) for words in (TAKES_ROOM, GIVES_ROOM))
     values = {"volume_m3": volume, "name": name}
     if volume > 0 and takes and not gives:
         text = message(
             "deadwood_takes",
-            "{volume_m3:+g} m3 adds to the capacity, but {name} takes up room: expected a "
-            "negative volume",
+            "{volume_m3:+g} m3 adds to the capacity, but {name} reduces it: expected a negative"
+            " volume",
             **values,
         )
     elif volume > 0 and not gives:
         text = message(
             "deadwood_sign_unsaid",
-            "{volume_m3:+g} m3 adds to the capacity, and the name {name} does not show how: "
-            "expected a negative volume for what stands in the tank, or the name of what "
-            "adds room, such as manhole or sump",
+            "{volume_m3:+g} m3 adds to the capacity, but {name} is no known name of an added"
+            " space: expected a negative volume for an object in the tank, or a name such as"
+            " manhole or sump",
             **values,
         )
     elif volume < 0 and gives:
         text = message(
             "deadwood_gives",
-            "{volume_m3:+g} m3 reduces the capacity, but {name} adds room: expected a "
-            "positive volume",
+            "{volume_m3:+g} m3 reduces the capacity, but {name} adds to it: expected a positive"
+            " volume",
             **values,
         )
     else:
@@ -100,12 +105,13 @@ def _check_sign(table, row, name, volume, log):
     log.warning(table.file, text, row, "volume_m3")
 
 
-def _is_of(name, words):
-    """Does the name begin a word with one of these?"""
+def _has_word(name, words):
+    """Determine whether a word of the name begins with any of `words`."""
     return any(re.search(rf"\b{re.escape(word)}", name.lower()) for word in words)
 
 
 def _check_place(table, row, bottom, top, volume, extent, log):
+    """Check that an item lies between the lowest point and the top of the tank."""
     if extent.top_m is not None and top > extent.top_m + TOLERANCE_M:
         expected = message(
             "deadwood_too_high",
@@ -132,6 +138,7 @@ def _check_place(table, row, bottom, top, volume, extent, log):
 
 
 def _check_volume(table, row, height, volume, extent, log):
+    """Check the volume of an item against the volume of the tank over its height."""
     if volume == 0:
         expected = message("deadwood_of_nothing", "found 0, which has no effect")
         log.warning(table.file, expected, row, "volume_m3")

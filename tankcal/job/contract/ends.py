@@ -1,4 +1,4 @@
-"""Ends of lying tanks and heads of upright ones: keys of their sizes, and what goes together."""
+"""Keys and checks of the ends of horizontal tanks and of the heads of vertical tanks."""
 
 from tankcal.errors import SolutionError
 from tankcal.job.checking import is_not_given, tell
@@ -8,18 +8,19 @@ from tankcal.tank.heads import KINDS, STANDARDS, End, depth_of, standard_end
 
 HORIZONTAL_ONLY = ("horizontal",)
 RADII = ("dish_radius_m", "knuckle_radius_m")
-DEEPEST_END = 2.0  # diameters
+DEEPEST_END = 2.0  # largest depth of an end over the diameter
+# Forms of ends that elliptical cylinders cannot have.
 ROUND_ONLY = ("torispherical", "spherical", "guppy")
 
 
 def end_keys(letter):
-    """The keys of one end of a horizontal cylinder."""
+    """Return the keys of one end of a horizontal cylinder."""
     name = f"end {letter.upper()}"
     return (
         choice(f"end_{letter}", f"form of {name}", KINDS, required=True, kinds=HORIZONTAL_ONLY),
         positive(
             f"end_{letter}_depth_m",
-            f"{name}: depth along the axis, metres; not of flat ends",
+            f"{name}: depth along the axis, metres; blank for flat ends",
             20,
             kinds=HORIZONTAL_ONLY,
         ),
@@ -28,16 +29,20 @@ def end_keys(letter):
 
 
 def torispherical_keys(prefix, name, kinds):
-    """Keys of the sizes that torispherical ends and heads alone have.
+    """Return the keys of the sizes of torispherical ends and heads.
 
     Parameters
     ----------
     prefix : str
-        Of the keys.
+        Prefix of the keys.
     name : str
-        Before the notes.
+        Text before the notes, with its separator.
     kinds : tuple of str
-        Of tanks.
+        Kinds of tank that have these keys.
+
+    Returns
+    -------
+    tuple of Field
     """
     return (
         positive(
@@ -54,7 +59,7 @@ def torispherical_keys(prefix, name, kinds):
         ),
         choice(
             f"{prefix}standard",
-            f"{name}standard that both radii follow from by the diameter; torispherical only",
+            f"{name}standard that defines both radii from the diameter; torispherical only",
             tuple(STANDARDS),
             kinds=kinds,
         ),
@@ -62,7 +67,18 @@ def torispherical_keys(prefix, name, kinds):
 
 
 def check_end(given, end, has_points, raw, log):
-    """Form and sizes of one end of a horizontal cylinder, "end_a" or "end_b"."""
+    """Check form and sizes of one end of a horizontal cylinder.
+
+    Parameters
+    ----------
+    given : dict
+        Values of [horizontal].
+    end : {"end_a", "end_b"}
+    has_points : bool
+        Whether the diameter comes from a survey, and not from [horizontal].
+    raw, log
+        Raw job, and log of its problems.
+    """
 
     def tell_problem(key, expected):
         tell(log.problem, raw, "horizontal", key, expected)
@@ -75,7 +91,7 @@ def check_end(given, end, has_points, raw, log):
     if form in ROUND_ONLY and None not in (height, width) and height != width:
         expected = message(
             "round_ends_only",
-            "found {form}; expected another form: this one is for round cylinders only",
+            "found {form}, an end for round cylinders only; expected another form",
             form=form,
         )
         tell_problem(end, expected)
@@ -84,7 +100,7 @@ def check_end(given, end, has_points, raw, log):
     if depth is not None and form == "flat":
         expected = message(
             "end_has_no_depth",
-            "given for a {form} end; expected a blank: such an end has no depth",
+            "given for a {form} end, which has no depth; expected a blank",
             form=form,
         )
         tell_problem(key, expected)
@@ -97,12 +113,12 @@ def check_end(given, end, has_points, raw, log):
 
 
 def depth_missing(form):
-    """What is said of an end or a head without the depth that its form needs."""
+    """Return the message for an end or head without the depth required by its form."""
     return message("end_depth_missing", "missing; expected the depth of the {form} end", form=form)
 
 
 def too_deep(depth, deepest, form):
-    """What is said of an end or a head deeper than its form can be."""
+    """Return the message for an end or head deeper than its form permits."""
     return message(
         "end_too_deep",
         "found {depth:g}; expected at most {deepest:g} m for a {form} end",
@@ -113,26 +129,28 @@ def too_deep(depth, deepest, form):
 
 
 def check_radii(section, given, form, depth_key, depth, diameter, raw, log, *, prefix=""):
-    """Sizes of a torispherical end or head: two of three, or a standard; none of another form.
+    """Check the sizes of a torispherical end or head, and refuse them for other forms.
+
+    Two of depth, dish radius and knuckle radius are required, or a standard.
 
     Parameters
     ----------
     section : str
-        Of job.toml.
+        Section of job.toml.
     given : dict
-        Its values.
+        Values of the section.
     form : str
-        Of the end.
+        Form of the end.
     depth_key : str
-        Key that the depth is given by.
+        Key of the depth.
     depth : float or None
-        From the edge to the tip, m.
+        Depth from the edge to the tip, m.
     diameter : float or None
-        m; None: not known yet.
+        Diameter of the tank, m; None if unknown.
     raw, log
-        Of the job.
+        Raw job, and log of its problems.
     prefix : str, optional
-        Of the keys.
+        Prefix of the keys.
     """
     names = {name: f"{prefix}{name}" for name in (*RADII, "standard")}
     if form != "torispherical":
@@ -140,31 +158,39 @@ def check_radii(section, given, form, depth_key, depth, diameter, raw, log, *, p
             if given[key] is not None:
                 expected = message(
                     "end_radius_unused",
-                    "given for a {form} end; expected only for a torispherical one",
+                    "given for a {form} end; expected only for a torispherical end",
                     form=form,
                 )
                 tell(log.problem, raw, section, key, expected)
         return
-    there, problems = _told_sizes(section, names, depth_key, raw)
+    present, problems = _find_sizes(section, names, depth_key, raw)
     for key, expected in problems:
         tell(log.problem, raw, section, key, expected)
-    if diameter is not None and there:
+    if diameter is not None and present:
         values = {name: given[key] for name, key in names.items()}
-        _check_sizes(section, values, names, there, depth_key, depth, diameter, raw, log)
+        _check_sizes(section, values, names, present, depth_key, depth, diameter, raw, log)
 
 
-def _told_sizes(section, names, depth_key, raw):
-    """(what gives the radii: their names or "standard"; [(key, what is wrong)]) of what is said."""
+def _find_sizes(section, names, depth_key, raw):
+    """Determine which sizes of a torispherical end are given, and which are missing or redundant.
+
+    Returns
+    -------
+    present : list of str
+        Names of the given radii, or "standard"; empty if they do not suffice.
+    problems : list of (str, str)
+        Key and message of each problem.
+    """
     has_depth = not is_not_given(raw, section, depth_key)
-    there = [name for name in RADII if not is_not_given(raw, section, names[name])]
+    present = [name for name in RADII if not is_not_given(raw, section, names[name])]
     if not is_not_given(raw, section, names["standard"]):
         beside = message(
             "end_radius_beside_standard",
             "given together with {standard}, which determines it; expected only one of them",
             standard=names["standard"],
         )
-        return ["standard"], [(names[name], beside) for name in there]
-    if has_depth and not there:
+        return ["standard"], [(names[name], beside) for name in present]
+    if has_depth and not present:
         alone = message(
             "end_depth_alone",
             "missing; expected one of {names} beside the depth of a torispherical end, or one of "
@@ -172,14 +198,14 @@ def _told_sizes(section, names, depth_key, raw):
             names=list(STANDARDS),
         )
         return [], [(names["standard"], alone)]
-    if not there:
+    if not present:
         neither = message(
             "end_standard_missing",
             "missing; expected one of {names} for a torispherical end, or its two radii",
             names=list(STANDARDS),
         )
         return [], [(names["standard"], neither)]
-    if has_depth and len(there) == 2:
+    if has_depth and len(present) == 2:
         over = message(
             "end_sizes_over",
             "given together with both radii; expected two of these three sizes of a torispherical "
@@ -187,12 +213,12 @@ def _told_sizes(section, names, depth_key, raw):
         )
         return [], [(depth_key, over)]
     missing = message("end_radius_missing", "missing; expected for a torispherical end")
-    lacking = [] if has_depth else [name for name in RADII if name not in there]
-    return there, [(names[name], missing) for name in lacking]
+    lacking = [] if has_depth else [name for name in RADII if name not in present]
+    return present, [(names[name], missing) for name in lacking]
 
 
-def _check_sizes(section, values, names, there, depth_key, depth, diameter, raw, log):
-    """Radii and depth against the diameter."""
+def _check_sizes(section, values, names, present, depth_key, depth, diameter, raw, log):
+    """Check radii and depth against the diameter."""
     dish, knuckle = (values[name] for name in RADII)
     half = diameter / 2
     if dish is not None and dish <= half:
@@ -215,10 +241,11 @@ def _check_sizes(section, values, names, there, depth_key, depth, diameter, raw,
         return
     if depth is None:
         return
-    if there == ["standard"]:
-        if values["standard"] is None:  # no such word: told already
+    if present == ["standard"]:
+        if values["standard"] is None:  # unknown standard, reported elsewhere
             return
         knuckle = STANDARDS[values["standard"]][1] * diameter
+    # The end is deeper than the cap of its dish over the whole diameter, and than its knuckle.
     least = knuckle if dish is None else dish - (dish**2 - half**2) ** 0.5
     if least is not None and not least < depth < half:
         expected = message(
@@ -233,7 +260,7 @@ def _check_sizes(section, values, names, there, depth_key, depth, diameter, raw,
 
 
 def depth_of_head(given, depth, diameter):
-    """Depth of the head of an upright tank, m: as given, or by its radii; None: not known."""
+    """Return the depth of a vertical tank's head, m, declared or from radii; None if unknown."""
     if depth is not None or given["form"] != "torispherical":
         return depth
     end = End("torispherical", 0.0, given["dish_radius_m"], given["knuckle_radius_m"])
@@ -241,5 +268,5 @@ def depth_of_head(given, depth, diameter):
         end = standard_end(End("torispherical"), given["standard"], diameter)
     try:
         return depth_of(end, diameter / 2)
-    except SolutionError:  # told by the checks of its sizes
+    except SolutionError:  # reported by the checks of the sizes
         return None

@@ -1,28 +1,32 @@
-"""The tables of bare wall hits by a total station, and of the control targets read between them."""
+"""Tables of total station hits on the bare wall, and of control targets read between them."""
 
 from tankcal.job.contract.observations import USE, angle_fields
 from tankcal.job.fields import Field
 
 
 def _time(required=False):
-    return Field("time", "time", "when, such as 2026-01-05T14:30", required=required)
+    """Return the column of the time of a reading."""
+    return Field("time", "time", "time of the reading, such as 2026-01-05T14:30", required=required)
 
 
 def _distance(note, required=False):
+    """Return the column of a slope distance."""
     return Field("distance_m", "number", note, required=required, low=0, high=1e4, above_low=True)
 
 
 SURFACES = ("paint", "rust", "tape")
-_SETUP = Field("setup", "name", "the set-up, as in setups.csv", required=True)
-_DIRECTION = angle_fields("direction", "as read, clockwise", (-1, 1))
-_ZENITH = angle_fields("zenith", "from the zenith down", (0, 0.5))
+_SETUP = Field("setup", "name", "set-up of setups.csv", required=True)
+_DIRECTION = angle_fields("direction", "direction as read, clockwise", (-1, 1))
+_ZENITH = angle_fields("zenith", "zenith angle, from the zenith downwards", (0, 0.5))
 WALL_HITS = (
     _SETUP,
-    Field("course", "name", "course of courses.csv that was hit; blank: the one at its height"),
+    Field(
+        "course", "name", "course of courses.csv that was hit; blank: determined from the height"
+    ),
     Field(
         "set",
         "name",
-        "set of directions within the set-up, with the zero that it has in directions.csv",
+        "set of directions within the set-up, with its zero as in directions.csv",
     ),
     *_DIRECTION,
     *_ZENITH,
@@ -30,7 +34,7 @@ WALL_HITS = (
     Field(
         "s_mm",
         "number",
-        "standard deviation of the distance, millimetres; blank: that of the instrument",
+        "standard deviation of the distance, millimetres; blank: value of the instrument",
         low=0,
         high=1e3,
         above_low=True,
@@ -38,7 +42,7 @@ WALL_HITS = (
     Field(
         "s_arcsec",
         "number",
-        "standard deviation of either angle, seconds of arc; blank: that of the instrument",
+        "standard deviation of each angle, seconds of arc; blank: value of the instrument",
         low=0,
         high=1e4,
         above_low=True,
@@ -46,7 +50,8 @@ WALL_HITS = (
     Field(
         "surface",
         "choice",
-        "what was hit: each has a bias by incidence of its own; blank: all the same",
+        "surface that was hit; each kind has a separate bias with incidence; blank: one common"
+        " bias",
         choices=SURFACES,
     ),
     _time(),
@@ -54,18 +59,18 @@ WALL_HITS = (
 )
 CONTROL_READINGS = (
     _SETUP,
-    Field("target", "name", "the control target; read again to see a drift", required=True),
+    Field("target", "name", "control target; repeated readings show a drift", required=True),
     *_DIRECTION,
     *_ZENITH,
     _distance("slope distance as read, metres"),
     _time(required=True),
 )
-BESIDE = (  # what ties set-ups, and what tells an offset
+BESIDE = (  # tables that connect set-ups or determine an offset
     *("setups", "control", "directions", "zenith_angles", "slope_distances"),
     *("circumferences", "obstructions"),
 )
 COLUMNS = {"wall_hits": WALL_HITS, "control_readings": CONTROL_READINGS}
-RANGING = (  # keys of instruments.toml
+RANGING = (  # keys of instruments.toml for ranging on the wall
     Field(
         "s_mm",
         "number",
@@ -85,8 +90,8 @@ RANGING = (  # keys of instruments.toml
     Field(
         "u_incidence_mm",
         "number",
-        "standard uncertainty of how much more or less is ranged at 60 degrees of incidence than"
-        " square to the wall, millimetres; blank: 1",
+        "standard uncertainty of the ranging bias at 60 degrees of incidence, relative to"
+        " perpendicular incidence, millimetres; blank: 1",
         low=0,
         high=100,
     ),

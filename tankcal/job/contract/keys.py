@@ -1,4 +1,4 @@
-"""The keys of job.toml that every kind of tank has, or most of them."""
+"""Keys of job.toml that all or most kinds of tank have."""
 
 from tankcal.job.contract.kinds import KINDS, LOADED, VERTICAL, WITH_POINTS
 from tankcal.job.contract.registers import CAMERA_SETTINGS
@@ -7,56 +7,56 @@ from tankcal.job.fields import Field
 from tankcal.text.languages import LANGUAGES
 
 SPHERE = ("sphere",)
-MOST_BAR = 50  # of a sphere that stores under pressure
-
-# The keys of [table].
+MOST_BAR = 50  # largest gauge pressure of a sphere, bar
 
 TABLE = (
     positive(
         "step_m",
-        "step of the capacity table, metres: 0.01 for centimetres; blank with feet and inches",
+        "step of the capacity table, metres: 0.01 for centimetres; blank if heights are in feet"
+        " and inches",
         start="0.01",
     ),
     number(
         "reference_temperature_c",
-        "shell temperature that the table is for, degrees Celsius",
+        "reference temperature of the shell for the table, degrees Celsius",
         -200,
         300,
         required=True,
     ),
     choice(
         "height_unit",
-        "of the printed table: m, or feet and inches in steps of 1/8 or 1/16 inch; blank: m",
+        "unit of heights in the printed table: m, or feet and inches in steps of 1/8 or 1/16"
+        " inch; blank: m",
         ("m", "ft-in-8", "ft-in-16"),
     ),
     choice(
         "volume_unit",
-        "of all volumes in the report: m3, L, or bbl (42 US gallons); blank: m3",
+        "unit of all volumes in the report: m3, L, or bbl (42 US gallons); blank: m3",
         ("m3", "L", "bbl"),
     ),
     positive("fine_step_m", "smaller step within fine_zones, metres"),
     Field(
         "fine_zones",
         "ranges",
-        "dips, metres, between which the table has that step: 0-0.3; 2.1-2.4",
+        "ranges of dips with the step fine_step_m, metres: 0-0.3; 2.1-2.4",
     ),
     positive(
         "max_interpolation_error_l",
-        "largest error of linear interpolation between rows, litres; without step_m the step is"
-        " chosen by it",
+        "largest error of linear interpolation between rows, litres; determines the step if"
+        " step_m is blank",
         1e5,
     ),
-    Field("height_expansion", "flag", "true: dips expand with the shell, too; blank: false"),
+    Field("height_expansion", "flag", "true: dips expand with the shell; blank: false"),
     number(
         "liquid_density_kg_m3",
-        "density of the liquid that loads the shell, kg/m3; 0 or blank: no head",
+        "density of the liquid that loads the shell, kg/m3; 0 or blank: no liquid head",
         0,
         3000,
         kinds=LOADED,
     ),
     number(
         "pressure_bar",
-        "gauge pressure in the sphere that the table is for, bar; 0 or blank: none",
+        "gauge pressure in the sphere for the table, bar; 0 or blank: none",
         0,
         MOST_BAR,
         kinds=SPHERE,
@@ -64,49 +64,57 @@ TABLE = (
     Field(
         "other_densities_kg_m3",
         "numbers",
-        "densities of further tables, kg/m3: 700; 850",
+        "densities of additional tables, kg/m3: 700; 850",
         kinds=LOADED,
         low=0,
         above_low=True,
         high=3000,
     ),
-    number("coverage_probability", "of the expanded uncertainty; blank: 0.95", 0.5, 0.9999),
+    number(
+        "coverage_probability",
+        "coverage probability of the expanded uncertainty; blank: 0.95",
+        0.5,
+        0.9999,
+    ),
     Field(
         "rule",
         "rule name",
-        "decision rule that the table is judged by: one that ships with tankcal, such as oiml_r71,"
-        " or a .toml file beside job.toml; blank: none",
+        "decision rule for the table: a rule of tankcal, such as oiml_r71, or a .toml file"
+        " beside job.toml; blank: none",
     ),
     Field(
         "minimum_delivery_m",
         "numbers",
-        "heights of the least deliveries whose worst uncertainty is reported, metres: 1.5; 2;"
-        " blank: 1.5, 2 and 3 as far as they fit",
+        "heights of the minimum deliveries whose largest uncertainty is reported, metres: 1.5;"
+        " 2; blank: 1.5, 2 and 3, as far as the tank allows",
         low=0,
         above_low=True,
         high=100,
     ),
     Field(
-        "monte_carlo", "flag", "false: no Monte Carlo beside the law of propagation; blank: true"
+        "monte_carlo",
+        "flag",
+        "false: no Monte Carlo run beside the law of propagation of uncertainty; blank: true",
     ),
-    choice("language", "language of the papers; blank: English", LANGUAGES),
+    choice("language", "language of the report; blank: English", LANGUAGES),
 )
 
 
 def _text(name, note):
+    """Return a key for a text."""
     return Field(name, "text", note)
 
 
 def _size(name, note, high, required_for=()):
+    """Return a key for a nominal size, metres."""
     return number(name, note, 0.1, high, required_for=required_for)
 
 
 TANK = (
-    Field("id", "tank id", "the tank's name or number", required=True),
+    Field("id", "tank id", "name or number of the tank", required=True),
     choice(
         "kind",
-        "kind of tank: vertical (an upright cylinder), horizontal (a lying one), sphere, or mesh"
-        " (any closed surface)",
+        "kind of tank: vertical or horizontal (cylinder), sphere, or mesh (any closed surface)",
         KINDS,
         required=True,
         start="vertical",
@@ -119,14 +127,14 @@ TANK = (
         0.01,
         1e6,
     ),
-    _text("owner", "who owns the tank"),
-    _text("location", "where it stands"),
-    _text("product", "what is stored in it"),
-    _text("manufacturer", "who built it"),
-    _text("year", "when it was built"),
-    _text("serial_number", "number on its plate"),
-    _text("construction", "such as: welded, butt joints, fixed roof"),
-    _text("remarks", "anything to be printed about the tank"),
+    _text("owner", "owner of the tank"),
+    _text("location", "location of the tank"),
+    _text("product", "product stored in the tank"),
+    _text("manufacturer", "manufacturer of the tank"),
+    _text("year", "year of construction"),
+    _text("serial_number", "serial number on the plate of the tank"),
+    _text("construction", "type of construction, such as: welded, butt joints, fixed roof"),
+    _text("remarks", "remarks to be printed about the tank"),
 )
 SURVEY = (
     choice(
@@ -136,7 +144,7 @@ SURVEY = (
         required=True,
         kinds=WITH_POINTS,
     ),
-    Field("date", "date", "day of the survey, year-month-day", required=True),
+    Field("date", "date", "date of the survey, year-month-day", required=True),
     number(
         "shell_temperature_c",
         "temperature of the shell during the survey, degrees Celsius; blank: no correction",
@@ -145,15 +153,15 @@ SURVEY = (
     ),
     number(
         "liquid_level_m",
-        "liquid in the tank during the survey: its dip from the table's zero, metres; 0 or blank:"
-        " empty",
+        "dip of the liquid in the tank during the survey, from the table's zero, metres; 0 or"
+        " blank: empty",
         0,
         100,
         kinds=LOADED,
     ),
     number(
         "liquid_density_kg_m3",
-        "density of that liquid, kg/m3; 0 or blank: empty",
+        "density of the liquid in the tank during the survey, kg/m3; 0 or blank: empty",
         0,
         3000,
         kinds=LOADED,
@@ -177,13 +185,17 @@ DATUM = (
     ),
     number(
         "dip_plate_z_m",
-        "z of the dip plate, the table's zero, metres; blank: the bottom",
+        "z of the dip plate (the table's zero), metres; blank: the bottom",
         -1e5,
         1e5,
     ),
     number("dip_x_m", "x of the dip point, metres", -1e8, 1e8, kinds=VERTICAL),
     number("dip_y_m", "y of the dip point, metres", -1e8, 1e8, kinds=VERTICAL),
-    positive("reference_height_m", "gauge reference point above the table's zero, metres", 200),
+    positive(
+        "reference_height_m",
+        "height of the gauge reference point above the table's zero, metres",
+        200,
+    ),
 )
 MATERIAL = (
     number("e_gpa", "Young's modulus of the shell, GPa; blank: 206", 40, 500, kinds=LOADED),
@@ -196,19 +208,18 @@ ADJUSTMENT = (
     Field(
         "snooping",
         "flag",
-        "test the points and reject the bad ones; blank: true",
+        "test the points and reject outliers; blank: true",
         kinds=WITH_POINTS,
     ),
     choice(
         "scale",
-        "variances as given (a_priori) or from the residuals; blank: a_priori",
+        "variances as given (a_priori) or scaled by the residuals (a_posteriori); blank: a_priori",
         ("a_priori", "a_posteriori"),
         kinds=WITH_POINTS,
     ),
     choice(
         "datum",
-        "what holds the frame of the adjusted points: control, fixed_photo, minimal or inner;"
-        " blank: control",
+        "datum of the adjusted points: control, fixed_photo, minimal or inner; blank: control",
         ("control", "fixed_photo", "minimal", "inner"),
         kinds=WITH_POINTS,
         of_survey=True,
@@ -216,28 +227,29 @@ ADJUSTMENT = (
     Field(
         "datum_points",
         "names",
-        "points that carry the datum minimal or inner: P7; P9:xy; P3:z; blank: chosen",
+        "points that define the datum minimal or inner: P7; P9:xy; P3:z; blank: chosen"
+        " automatically",
         kinds=WITH_POINTS,
         of_survey=True,
     ),
     Field(
         "fixed_photo",
         "name",
-        "the photo that holds the datum fixed_photo",
+        "photo that defines the datum fixed_photo",
         kinds=WITH_POINTS,
         of_survey=True,
     ),
     positive(
         "image_sd_um",
-        "standard deviation of image coordinates that carry none, micrometres",
+        "standard deviation of image coordinates whose row states none, micrometres",
         1e4,
         kinds=WITH_POINTS,
         of_survey=True,
     ),
     positive(
         "reading_limit_um",
-        "largest standard deviation of repeated readings of an image point or mark, micrometres;"
-        " beyond it they are rejected; blank: none are",
+        "largest standard deviation of repeated readings of an image point or mark,"
+        " micrometres; larger: they are rejected; blank: no limit",
         1e4,
         kinds=WITH_POINTS,
         of_survey=True,
@@ -245,15 +257,15 @@ ADJUSTMENT = (
     Field(
         "depth_of_field",
         "flag",
-        "true: radial distortion by the depth of each point, from focus_calibrations in"
-        " cameras.toml; blank: false",
+        "true: radial distortion depends on the depth of each point (focus_calibrations of"
+        " cameras.toml); blank: false",
         kinds=WITH_POINTS,
         of_survey=True,
     ),
     choice(
         "image_weights",
-        "image in which residuals are counted and weighed: measured or ideal (after the"
-        " correction); blank: measured",
+        "image coordinates of residuals and weights: measured, or ideal (after the correction);"
+        " blank: measured",
         ("measured", "ideal"),
         kinds=WITH_POINTS,
         of_survey=True,
@@ -261,7 +273,7 @@ ADJUSTMENT = (
     number(
         "refraction",
         "coefficient of refraction for zenith and vertical angles and slope distances, such as"
-        " 0.13; blank: neither curvature nor refraction",
+        " 0.13; blank: no correction for curvature and refraction",
         -5,
         5,
         kinds=WITH_POINTS,
@@ -270,35 +282,35 @@ ADJUSTMENT = (
 )
 CERTIFICATE = (
     _text("number", "number of the certificate"),
-    _text("laboratory", "who issues the certificate"),
-    _text("laboratory_address", "the issuer's address"),
-    _text("country", "where it is issued, two letters of ISO 3166-1, such as: BR"),
+    _text("laboratory", "laboratory that issues the certificate"),
+    _text("laboratory_address", "address of the laboratory"),
+    _text("country", "country of issue, two letters of ISO 3166-1, such as: BR"),
     _text("accreditation_number", "accreditation of the laboratory, such as: CAL 0123"),
-    _text("customer", "who ordered the calibration"),
-    _text("customer_address", "the customer's address"),
-    _text("customer_contact", "whom the customer named, with telephone or e-mail"),
-    _text("place", "where the calibration was made; blank: where the tank stands"),
-    _text("method", "how it was surveyed, such as: total station, ISO 7507-3"),
-    _text("procedure", "the laboratory's own procedure"),
-    _text("deviations", "what was done otherwise than the method says, or left out"),
-    _text("operator", "who surveyed"),
-    _text("equipment", "instruments that were used"),
-    _text("traceability", "to what standards, and by which certificates, results are traceable"),
+    _text("customer", "customer who ordered the calibration"),
+    _text("customer_address", "address of the customer"),
+    _text("customer_contact", "contact named by the customer, with telephone or e-mail"),
+    _text("place", "place of the calibration; blank: location of the tank"),
+    _text("method", "method of the survey, such as: total station, ISO 7507-3"),
+    _text("procedure", "procedure of the laboratory"),
+    _text("deviations", "deviations from the method, omissions included"),
+    _text("operator", "name of the surveyor"),
+    _text("equipment", "instruments used"),
+    _text("traceability", "standards and certificates that make the results traceable"),
     _text("conditions", "weather during the survey"),
     _text("condition_of_tank", "state of the tank during the survey, such as: clean, empty"),
-    _text("external_results", "results that came from others, and from whom"),
-    _text("customer_data", "what the customer supplied and the laboratory did not measure"),
-    _text("replaces", "the certificate that this one replaces, and why"),
-    _text("authorised_by", "who authorises the certificate"),
-    _text("authorised_role", "that person's function"),
-    Field("date_of_issue", "date", "day of issue, year-month-day"),
-    _text("remarks", "anything to be printed on the certificate"),
-    _text("notice", "a word that every page carries, such as RECONSTRUCTION"),
+    _text("external_results", "results from external providers, and their names"),
+    _text("customer_data", "data supplied by the customer and not measured by the laboratory"),
+    _text("replaces", "certificate replaced by this certificate, and the reason"),
+    _text("authorised_by", "person who authorises the certificate"),
+    _text("authorised_role", "function of the person who authorises the certificate"),
+    Field("date_of_issue", "date", "date of issue, year-month-day"),
+    _text("remarks", "remarks to be printed on the certificate"),
+    _text("notice", "notice printed on every page, such as RECONSTRUCTION"),
 )
 CSV = (
     choice(
         "separator",
-        "between the cells of the CSV files: , or ; or a tab",
+        "separator of the cells in the CSV files: , or ; or a tab",
         (",", ";", "\t"),
         start=",",
     ),
@@ -317,6 +329,6 @@ KEYS = {
     "csv": CSV,
 }
 
-# what forms of these surveys have beforehand, in place of `start`
+# Values that starter forms of these surveys contain, in place of `start`.
 STARTS_OF_STRAPPING = {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
-STARTS_OF_LIQUID = {"survey.side": "inside", "datum.bottom_z_m": "0.0"}  # of upright tanks
+STARTS_OF_LIQUID = {"survey.side": "inside", "datum.bottom_z_m": "0.0"}  # vertical tanks only

@@ -1,27 +1,27 @@
-"""The tables of reference lines: lines of sight round a tank, and offsets of its wall from them."""
+"""Tables of reference lines: lines of sight round a tank and offsets of the wall from them."""
 
 from tankcal.job.contract.observations import USE
 from tankcal.job.fields import Field
 
 LINES = (
-    Field("line", "name", "its name", required=True),
+    Field("line", "name", "name of the reference line", required=True),
     Field(
         "azimuth_deg",
         "number",
-        "where it stands, degrees clockwise from +y; all blank: evenly in the order of the rows,"
-        " from 0",
+        "azimuth of the line, degrees clockwise from +y; all blank: evenly spaced in the order"
+        " of the rows, from 0",
         low=-360,
         high=360,
     ),
     Field(
         "instrument",
         "name",
-        "plummet of instruments.toml; blank: the only instrument there that is no tape",
+        "plummet of instruments.toml; blank: the only instrument there other than a tape",
     ),
     Field(
         "side",
         "choice",
-        "on which side of the wall it stands; blank: outside",
+        "side of the wall on which the line was set up; blank: outside",
         choices=("outside", "inside"),
     ),
 )
@@ -39,7 +39,7 @@ OFFSETS = (
     Field(
         "offset_mm",
         "number",
-        "horizontal distance of the wall from the line, by a scale of any zero, millimetres",
+        "horizontal distance of the wall from the line, read on a scale with any zero, millimetres",
         required=True,
         low=-5000,
         high=5000,
@@ -53,21 +53,27 @@ OFFSETS = (
         high=100,
         above_low=True,
     ),
-    Field("face", "number", "1, or 2: the plummet turned by half a turn; blank: 1", low=1, high=2),
+    Field(
+        "face",
+        "number",
+        "face of the plummet: 1, or 2 (rotated by half a turn); blank: 1",
+        low=1,
+        high=2,
+    ),
     Field(
         "reference",
         "flag",
-        "true: read at the reference level; all blank: the lowest level that every line has",
+        "true: reading at the reference level; all blank: the lowest level read on every line",
     ),
     USE,
 )
 COLUMNS = {"lines": LINES, "offsets": OFFSETS}
-PLUMMET = (  # keys of instruments.toml
+PLUMMET = (  # keys of instruments.toml for plummets
     Field(
         "u_collimation_arcsec",
         "number",
-        "standard uncertainty of how upright a plummet's line is, seconds of arc; blank: its two"
-        " faces tell it",
+        "standard uncertainty of the verticality of a plummet's line, seconds of arc; blank:"
+        " estimated from its two faces",
         low=0,
         high=3600,
     ),

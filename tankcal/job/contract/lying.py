@@ -1,4 +1,4 @@
-"""[horizontal] and [sphere]: their keys; sizes complete, consistent, and said once."""
+"""Keys of [horizontal] and [sphere], and checks that sizes are complete and consistent."""
 
 from tankcal.job.checking import is_not_given, missing_beside, settings_place, tell
 from tankcal.job.contract.ends import HORIZONTAL_ONLY, check_end, end_keys
@@ -10,13 +10,15 @@ SPHERE_ONLY = ("sphere",)
 
 
 def _length(name, note, kinds, high=100.0, required=False):
+    """Return a key for a length above 0, metres."""
     return positive(name, note, high, required=required, kinds=kinds)
 
 
 def _thickness(kinds):
+    """Return the key of the thickness of plate and paint."""
     return number(
         "thickness_mm",
-        "plate and paint together, millimetres: subtracted from what was measured outside",
+        "thickness of plate and paint together, millimetres; subtracted from outside measurements",
         0,
         100,
         kinds=kinds,
@@ -34,7 +36,7 @@ HORIZONTAL = (
     _length("height_m", "height of an elliptical cylinder, metres", HORIZONTAL_ONLY, 20),
     _length(
         "length_m",
-        "length of the cylinder, without the ends, metres; nothing is subtracted from it",
+        "length of the cylinder without the ends, metres; no thickness is subtracted",
         HORIZONTAL_ONLY,
         200,
         required=True,
@@ -43,46 +45,47 @@ HORIZONTAL = (
     *end_keys("b"),
     number(
         "tilt_mm_per_m",
-        "rise of end B over end A, millimetres per metre of axis; negative: A is higher; blank: 0;"
-        " not with points",
+        "rise of end B above end A, millimetres per metre of axis; negative: A is higher;"
+        " blank: 0; blank if points are given",
         -200,
         200,
         kinds=HORIZONTAL_ONLY,
     ),
     number(
         "roll_deg",
-        "turn of an elliptical cross-section, or of guppy ends, about the axis, degrees, clockwise"
-        " seen from A; blank: 0",
+        "rotation of an elliptical cross-section, or of guppy ends, about the axis, degrees,"
+        " clockwise seen from A; blank: 0",
         -90,
         90,
         kinds=HORIZONTAL_ONLY,
     ),
     number(
         "dip_from_a_m",
-        "dip point: along the axis from the start of the cylinder at A, metres; blank: half the"
-        " length, where there is no tilt",
+        "distance of the dip point along the axis from the start of the cylinder at A, metres;"
+        " blank: half the length, only without tilt",
         0,
         200,
         kinds=HORIZONTAL_ONLY,
     ),
     choice(
         "dip_direction",
-        "dips are read plumb, or square to the axis; blank: plumb",
+        "direction of the dips: plumb, or square (perpendicular to the axis); blank: plumb",
         ("plumb", "square"),
         kinds=HORIZONTAL_ONLY,
     ),
     number(
         "tube_angle_deg",
-        "gauge tube of a round tank that was rolled: its angle off the plumb, in the plane square"
-        " to the axis, degrees; above 0: its top leans to the right, seen from A; blank: 0",
+        "angle of the gauge tube of a rolled round tank from the vertical, in the plane"
+        " perpendicular to the axis, degrees; above 0: its top leans to the right, seen from A;"
+        " blank: 0",
         -60,
         60,
         kinds=HORIZONTAL_ONLY,
     ),
     number(
         "tube_offset_m",
-        "gauge tube of a round tank that does not cross the axis: the distance at which it passes,"
-        " metres; above 0: to the right, seen from A; blank: 0",
+        "distance of the gauge tube from the axis of a round tank, metres; above 0: to the"
+        " right, seen from A; blank: 0",
         -10,
         10,
         kinds=HORIZONTAL_ONLY,
@@ -90,8 +93,8 @@ HORIZONTAL = (
     _thickness(HORIZONTAL_ONLY),
     number(
         "azimuth_deg",
-        "direction from A to B, degrees clockwise from +y, so that the points know which end is A;"
-        " only with points",
+        "azimuth of the axis from A to B, degrees clockwise from +y, which identifies end A in"
+        " the points; only with points",
         0,
         360,
         kinds=HORIZONTAL_ONLY,
@@ -104,8 +107,8 @@ SPHERE = (
     _thickness(SPHERE_ONLY),
     number(
         "ovality_mm",
-        "only with great_circles: standard deviation of how oval and how flat the sphere is, where"
-        " no strap tells it, millimetres; blank: 0.1 % of its radius",
+        "only with great_circles: standard deviation of ovality and flattening where the great"
+        " circles do not determine them, millimetres; blank: 0.1 % of the radius",
         0,
         500,
         above_low=True,
@@ -113,7 +116,7 @@ SPHERE = (
     ),
     number(
         "form_mm",
-        "only with great_circles: standard deviation of its radius beyond the ellipsoid (plates,"
+        "only with great_circles: standard deviation of the radius about the ellipsoid (plates,"
         " seams, legs), millimetres; blank: 4.3",
         0,
         500,
@@ -123,22 +126,31 @@ SPHERE = (
 
 KEYS = {"horizontal": HORIZONTAL, "sphere": SPHERE}
 
-STRONG_TILT_MM_PER_M = 50
+STRONG_TILT_MM_PER_M = 50  # warning above
 ROUND_TUBE = message(
     "tube_round_only", "expected only for a round cylinder: diameter_m, or points.csv"
 )
 RINGS_WITHOUT_TUBE = message(
     "tube_beside_rings",
-    "cannot be given with rings.csv; expected a blank: dips of rings are taken through their axis",
+    "cannot be given with rings.csv; expected a blank: dips in a tank of rings are taken"
+    " through its axis",
 )
 SIZES = ("diameter_m", "width_m", "height_m")
 
 
 def check_horizontal(values, wall, raw, log, height_m=None):
-    """Sizes, ends, tilt and dip point of a horizontal cylinder.
+    """Check sizes, ends, tilt and dip point of a horizontal cylinder.
 
-    wall      what it comes from: "points", "straps", or None: the sizes
-    height_m  of the cylinder where a tape tells it, about
+    Parameters
+    ----------
+    values : dict
+        Values of job.toml.
+    wall : {"points", "straps"} or None
+        Source of the cylinder; None: sizes of [horizontal].
+    raw, log
+        Raw job, and log of its problems.
+    height_m : float, optional
+        Approximate height of the cylinder, m, if determined by tape.
     """
     has_points = wall == "points"
 
@@ -190,13 +202,16 @@ def check_horizontal(values, wall, raw, log, height_m=None):
 
 
 def _check_ringed(given, raw, log):
-    """Rings have sizes and plates of their own; thickness_mm is of the ends alone."""
+    """Refuse sizes beside rings, and require thickness_mm for curved ends.
+
+    Rings have their own sizes and plates; thickness_mm then applies to the ends only.
+    """
     for key in (*SIZES, "roll_deg"):
         if given[key]:
             expected = message(
                 "size_beside_rings",
-                "given together with circumferences by tape; expected only one of them: the rings"
-                " are round, and have their sizes from these",
+                "given together with circumferences by tape; expected only one of them: the"
+                " rings are round, with sizes from the tape",
             )
             tell(log.problem, raw, "horizontal", key, expected)
     for key in ("tube_angle_deg", "tube_offset_m"):
@@ -206,13 +221,14 @@ def _check_ringed(given, raw, log):
     if curved and is_not_given(raw, "horizontal", "thickness_mm"):
         expected = message(
             "end_thickness_missing",
-            "missing; expected plate and paint of the ends, which are subtracted from their depths"
-            " or radii (0: these are inside)",
+            "missing; expected plate and paint of the ends, which are subtracted from their"
+            " depths or radii (0: inside sizes)",
         )
         tell(log.problem, raw, "horizontal", "thickness_mm", expected)
 
 
 def _refuse_given(given, keys, raw, log, section="horizontal"):
+    """Refuse sizes that are determined by points.csv."""
     for key in keys:
         if given[key] is not None:
             expected = message(
@@ -224,7 +240,7 @@ def _refuse_given(given, keys, raw, log, section="horizontal"):
 
 
 def _check_sizes(given, raw, log):
-    """A diameter, or width and height."""
+    """Check that either a diameter, or width and height, are given."""
 
     def missing(key):
         return is_not_given(raw, "horizontal", key)
@@ -251,7 +267,7 @@ def _check_sizes(given, raw, log):
 
 
 def _check_thickness(given, side, section, raw, log):
-    """Plates count for what was measured outside only, and there they must be said."""
+    """Require thickness_mm with an outside survey, and refuse it with an inside survey."""
     if side == "outside" and is_not_given(raw, section, "thickness_mm"):
         expected = message(
             "thickness_missing",
@@ -261,12 +277,14 @@ def _check_thickness(given, side, section, raw, log):
     elif side != "outside" and given["thickness_mm"]:
         expected = message(
             "thickness_unused",
-            "expected only with survey.side = outside: with side = inside nothing is subtracted",
+            "expected only with survey.side = outside: no thickness is subtracted from inside"
+            " sizes",
         )
         tell(log.problem, raw, section, "thickness_mm", expected)
 
 
 def _check_dip(given, height_m, raw, log):
+    """Check that the dip point lies within the cylinder, and that tilt and roll are plausible."""
     dip, length, tilt = (given[key] for key in ("dip_from_a_m", "length_m", "tilt_mm_per_m"))
     height = given["height_m"] or given["diameter_m"] or height_m
     if None not in (dip, length):
@@ -295,20 +313,22 @@ def _check_dip(given, height_m, raw, log):
         tell(log.warning, raw, "horizontal", "roll_deg", expected)
     if tilt and is_not_given(raw, "horizontal", "dip_from_a_m"):
         expected = message(
-            "dip_missing", "missing; expected the place of the dip point, because the tank leans"
+            "dip_missing",
+            "missing; expected the place of the dip point, because the tank is tilted",
         )
         tell(log.problem, raw, "horizontal", "dip_from_a_m", expected)
     if tilt and abs(tilt) > STRONG_TILT_MM_PER_M:
         expected = message(
             "large_tilt",
-            "{tilt_mm_per_m:g} mm/m is large; tanks lean by 5 to 20: is it in another unit?",
+            "{tilt_mm_per_m:g} mm/m is large; typical tilts are 5 to 20 mm/m: is it in another"
+            " unit?",
             tilt_mm_per_m=tilt,
         )
         tell(log.warning, raw, "horizontal", "tilt_mm_per_m", expected)
 
 
 def _check_tube(given, has_points, raw, log):
-    """A gauge tube off the axis or off the plumb: across a round tank, and not plumb in a tilt."""
+    """Check that a gauge tube crosses a round tank, and does not lean in a tilted tank."""
     keys = [key for key in ("tube_angle_deg", "tube_offset_m") if given[key]]
     diameter = given["diameter_m"]
     for key in keys:
@@ -327,21 +347,34 @@ def _check_tube(given, has_points, raw, log):
     if "tube_angle_deg" in keys and leans and given["dip_direction"] != "square":
         expected = message(
             "tube_of_tilted_tank",
-            "expected square beside tube_angle_deg: a tube that leans in the plane square to the "
-            "axis of a tank that is tilted is not plumb",
+            "expected square with tube_angle_deg: in a tilted tank, a tube that leans in the"
+            " plane perpendicular to the axis is not vertical",
         )
         tell(log.problem, raw, "horizontal", "dip_direction", expected)
     if abs(given["tube_angle_deg"] or 0.0) > STRONG_ROLL_DEG:
         expected = message(
             "large_roll",
-            "{angle_deg:g} degrees is large; tanks roll by 1 to 10: is it the angle off the plumb?",
+            "{angle_deg:g} degrees is large; typical rolls are 1 to 10 degrees: is it the angle"
+            " from the vertical?",
             angle_deg=given["tube_angle_deg"],
         )
         tell(log.warning, raw, "horizontal", "tube_angle_deg", expected)
 
 
 def check_sphere(values, has_points, has_circles, is_loaded, raw, log):
-    """The diameter, points of the wall, or great circles; plates where something loads them."""
+    """Check that a sphere has one source of its diameter, and plates if it is loaded.
+
+    Parameters
+    ----------
+    values : dict
+        Values of job.toml.
+    has_points, has_circles : bool
+        Whether the job has points.csv, or great_circles.csv.
+    is_loaded : bool
+        Whether a pressure or a density loads the sphere.
+    raw, log
+        Raw job, and log of its problems.
+    """
     given = values["sphere"]
     if not is_loaded or values["survey"]["side"] == "outside":
         _check_thickness(given, values["survey"]["side"], "sphere", raw, log)
@@ -352,8 +385,8 @@ def check_sphere(values, has_points, has_circles, is_loaded, raw, log):
     ):
         expected = message(
             "thickness_of_loaded_sphere",
-            "missing or 0, but a pressure or a density is given; expected the plates, which give"
-            " way to it",
+            "missing or 0, but a pressure or a density is given; expected the plate thickness:"
+            " the plates stretch under this load",
         )
         tell(log.problem, raw, "sphere", "thickness_mm", expected)
     if has_points:

@@ -1,4 +1,4 @@
-"""The columns of the tables of a survey: photographs, angles, distances, levels, control."""
+"""Columns of the tables of a survey: photographs, angles, distances, heights, control."""
 
 from dataclasses import dataclass
 
@@ -9,20 +9,23 @@ FULL_CIRCLE = {"deg": 360, "gon": 400, "dms": 360}
 USE = Field(
     "use",
     "choice",
-    "check: compared with the adjustment, not adjusted; blank: adjust",
+    "check: only compared with the adjusted values; blank: adjust",
     choices=("adjust", "check"),
 )
 
 
 def _name(name, note, required=True):
+    """Return a column for a name."""
     return Field(name, "name", note, required=required)
 
 
 def _number(name, note, low, high, required=False, above_low=False):
+    """Return a column for a number from `low` to `high`."""
     return Field(name, "number", note, required=required, low=low, high=high, above_low=above_low)
 
 
 def _coordinates(required=False):
+    """Return the columns of the coordinates x, y and z."""
     return tuple(
         _number(
             f"{axis}_m",
@@ -36,7 +39,22 @@ def _coordinates(required=False):
 
 
 def angle_fields(name, note, circles=(0, 1)):
-    """One angle in three units; circles: its bounds, in parts of the full circle."""
+    """Return the columns of an angle, a column for each unit of ANGLE_UNITS.
+
+    Parameters
+    ----------
+    name : str
+        Name of the columns without the unit.
+    note : str
+        Note of the columns without the unit, which is added before the first semicolon.
+    circles : tuple of float, optional
+        Lower and upper bound, in parts of the full circle.
+
+    Returns
+    -------
+    tuple of Field
+    """
+    quantity, semicolon, condition = note.partition(";")
     words = {
         "deg": "degrees",
         "gon": "gon",
@@ -46,7 +64,7 @@ def angle_fields(name, note, circles=(0, 1)):
         Field(
             f"{name}_{unit}",
             "dms" if unit == "dms" else "number",
-            f"{note}, {words[unit]}",
+            f"{quantity}, {words[unit]}{semicolon}{condition}",
             low=circles[0] * FULL_CIRCLE[unit],
             high=circles[1] * FULL_CIRCLE[unit],
         )
@@ -55,25 +73,28 @@ def angle_fields(name, note, circles=(0, 1)):
 
 
 def _sd_mm(of):
-    note = f"standard deviation of {of}, millimetres; 0: held exactly"
+    """Return the column of a required standard deviation, millimetres."""
+    note = f"standard deviation of {of}, millimetres; 0: held fixed"
     return _number("s_mm", note, 0, 1e6, required=True)
 
 
 _S_ARCSEC = _number(
-    "s_arcsec", "standard deviation, seconds of arc; 0: held exactly", 0, 1e6, required=True
+    "s_arcsec", "standard deviation, seconds of arc; 0: held fixed", 0, 1e6, required=True
 )
-_SETUP = _name("setup", "the set-up, as in setups.csv")
+_SETUP = _name("setup", "set-up of setups.csv")
 _TARGET_HEIGHT = _number(
-    "target_height_m", "target above the mark of the point, metres; blank: 0", -50, 50
+    "target_height_m", "height of the target above the mark of the point, metres; blank: 0", -50, 50
 )
-_INSTRUMENT = _name("instrument", "the instrument, as in instruments.toml", required=False)
+_INSTRUMENT = _name("instrument", "instrument of instruments.toml", required=False)
 
 
 def _known_points():
+    """Return the columns of the standard deviations of known coordinates."""
     return tuple(
         _number(
             f"s{axis}_mm",
-            f"standard deviation of {axis}, millimetres; blank: an approximation only; 0: held",
+            f"standard deviation of {axis}, millimetres; blank: approximate coordinate only; 0:"
+            " held fixed",
             0,
             1e7,
         )
@@ -82,17 +103,20 @@ def _known_points():
 
 
 TARGETS = (
-    _name("point", "name of the target, once in the file"),
-    _name("section", "name of the ring of targets that it belongs to", required=False),
+    _name("point", "name of the target, unique in the file"),
+    _name("section", "name of the ring of targets", required=False),
     _name("generatrix", "name of the vertical line of targets", required=False),
-    _number("z_m", "its nominal height in the frame of the survey, metres", -1e8, 1e8),
+    _number("z_m", "nominal height of the target in the frame of the survey, metres", -1e8, 1e8),
     _number(
-        "offset_mm", "from the wall to the centre of the target, millimetres; blank: 0", -500, 500
+        "offset_mm",
+        "distance from the wall to the centre of the target, millimetres; blank: 0",
+        -500,
+        500,
     ),
 )
 PHOTOS = (
-    _name("photo", "name of the photo, once in the file"),
-    _name("camera", "the camera, as in cameras.toml"),
+    _name("photo", "name of the photo, unique in the file"),
+    _name("camera", "camera of cameras.toml"),
     *(
         _number(
             f"{axis}_m", f"{axis} of the projection centre, metres; blank: not known", -1e8, 1e8
@@ -107,7 +131,8 @@ PHOTOS = (
     *(
         _number(
             f"s{axis}_m",
-            f"standard deviation of {axis}, metres; blank: an approximation only; 0: held",
+            f"standard deviation of {axis}, metres; blank: approximate coordinate only; 0: held"
+            " fixed",
             0,
             1e6,
         )
@@ -116,7 +141,7 @@ PHOTOS = (
     *(
         _number(
             f"s_{angle}_{unit}",
-            f"standard deviation of {angle}, {words}; blank: an approximation only; 0: held",
+            f"standard deviation of {angle}, {words}; blank: approximate angle only; 0: held fixed",
             0,
             FULL_CIRCLE[unit],
         )
@@ -125,13 +150,21 @@ PHOTOS = (
     ),
 )
 IMAGE_POINTS = (
-    _name("photo", "the photo, as in photos.csv"),
-    _name("point", "the point; a repeated row is a repeated reading"),
+    _name("photo", "photo of photos.csv"),
+    _name("point", "name of the point; a repeated row is a repeated reading"),
     _number("x_mm", "image coordinate to the right of the middle, millimetres", -1e4, 1e4),
     _number("y_mm", "image coordinate above the middle, millimetres", -1e4, 1e4),
-    _number("column_px", "or: column, pixels; the centre of the first one is 0", -1e6, 1e6),
     _number(
-        "line_px", "line, pixels, counted downwards; the centre of the first one is 0", -1e6, 1e6
+        "column_px",
+        "in place of x_mm: column, pixels; the centre of the first column is 0",
+        -1e6,
+        1e6,
+    ),
+    _number(
+        "line_px",
+        "in place of y_mm: line, pixels, counted downwards; the centre of the first line is 0",
+        -1e6,
+        1e6,
     ),
     _number("sx_um", "standard deviation of x_mm, micrometres", 0, 1e5, above_low=True),
     _number("sy_um", "standard deviation of y_mm, micrometres", 0, 1e5, above_low=True),
@@ -139,45 +172,56 @@ IMAGE_POINTS = (
     USE,
 )
 FIDUCIALS = (
-    _name("photo", "the photo, as in photos.csv"),
-    _name("mark", "the fiducial mark, as in cameras.toml; a repeated row is a repeated reading"),
-    _number("x_mm", "as the comparator read it, millimetres", -1e4, 1e4, True),
-    _number("y_mm", "as the comparator read it, millimetres", -1e4, 1e4, True),
+    _name("photo", "photo of photos.csv"),
+    _name("mark", "fiducial mark of cameras.toml; a repeated row is a repeated reading"),
+    _number("x_mm", "comparator reading in x, millimetres", -1e4, 1e4, True),
+    _number("y_mm", "comparator reading in y, millimetres", -1e4, 1e4, True),
     _number(
         "s_um",
-        "standard deviation of both, micrometres; blank: image_sd_um",
+        "standard deviation of x_mm and y_mm, micrometres; blank: image_sd_um",
         0,
         1e5,
         above_low=True,
     ),
 )
 FILM = (
-    _name("camera", "the camera, as in cameras.toml: for all its photos; or a photo", False),
-    _name("photo", "one photo, in place of the camera", False),
-    _number("x_mm", "place on the film, to the right of the middle, millimetres", -1e3, 1e3, True),
-    _number("y_mm", "place on the film, above the middle, millimetres", -1e3, 1e3, True),
+    _name("camera", "camera of cameras.toml, for all its photos; or state a photo", False),
+    _name("photo", "single photo, in place of the camera", False),
     _number(
-        "height_um", "height of its surface there, towards the lens, micrometres", -5e3, 5e3, True
+        "x_mm", "position on the film, to the right of the middle, millimetres", -1e3, 1e3, True
+    ),
+    _number("y_mm", "position on the film, above the middle, millimetres", -1e3, 1e3, True),
+    _number(
+        "height_um",
+        "height of the film surface there, towards the lens, micrometres",
+        -5e3,
+        5e3,
+        True,
     ),
 )
 CONTROL = (
-    _name("point", "name of the point, once in each system"),
+    _name("point", "name of the point, unique in each system"),
     *_coordinates(),
     *_known_points(),
-    _name("system", "another coordinate system, by name; blank: that of the survey", False),
+    _name("system", "name of another coordinate system; blank: system of the survey", False),
     USE,
 )
 CHECK = CONTROL[:-1]
 SETUPS = (
-    _name("setup", "name of the set-up, once in the file"),
-    _name("station", "the point that the instrument stands over"),
+    _name("setup", "name of the set-up, unique in the file"),
+    _name("station", "point over which the instrument is set up"),
     _INSTRUMENT,
-    _number("instrument_height_m", "above the station's mark, metres; blank: 0", -50, 50),
+    _number(
+        "instrument_height_m",
+        "height of the instrument above the mark of the station, metres; blank: 0",
+        -50,
+        50,
+    ),
 )
 DISTANCES = (
-    _name("from", "one end"),
-    _name("to", "the other end"),
-    _number("distance_m", "as read, metres", 0, 1e6, True, True),
+    _name("from", "first point"),
+    _name("to", "second point"),
+    _number("distance_m", "distance as read, metres", 0, 1e6, True, True),
     _sd_mm("the distance"),
     Field(
         "kind",
@@ -186,75 +230,81 @@ DISTANCES = (
         choices=("spatial", "horizontal"),
     ),
     _INSTRUMENT,
-    _number("temperature_c", "of the tape, degrees Celsius; blank: no correction", -60, 90),
+    _number(
+        "temperature_c", "temperature of the tape, degrees Celsius; blank: no correction", -60, 90
+    ),
     USE,
 )
 SLOPE_DISTANCES = (
     _SETUP,
-    _name("to", "the point"),
-    _number("distance_m", "as read, metres", 0, 1e6, True, True),
+    _name("to", "target point"),
+    _number("distance_m", "distance as read, metres", 0, 1e6, True, True),
     _sd_mm("the distance"),
     _TARGET_HEIGHT,
     USE,
 )
 DIRECTIONS = (
     _SETUP,
-    _name("set", "set of directions within the set-up, with a zero of its own", False),
-    _name("to", "the point"),
-    *angle_fields("direction", "as read, clockwise", (-1, 1)),
+    _name("set", "set of directions within the set-up, with a separate zero", False),
+    _name("to", "target point"),
+    *angle_fields("direction", "direction as read, clockwise", (-1, 1)),
     _S_ARCSEC,
     _TARGET_HEIGHT,
     USE,
 )
 ZENITH_ANGLES = (
     _SETUP,
-    _name("to", "the point"),
-    *angle_fields("zenith", "from the zenith down", (0, 0.5)),
+    _name("to", "target point"),
+    *angle_fields("zenith", "zenith angle, from the zenith downwards", (0, 0.5)),
     _S_ARCSEC,
     _TARGET_HEIGHT,
     USE,
 )
 AZIMUTHS = (
-    _name("from", "where it was observed"),
-    _name("to", "the point"),
-    *angle_fields("azimuth", "clockwise from +y", (-1, 1)),
+    _name("from", "point of observation"),
+    _name("to", "target point"),
+    *angle_fields("azimuth", "azimuth, clockwise from +y", (-1, 1)),
     _S_ARCSEC,
     USE,
 )
 HORIZONTAL_ANGLES = (
-    _name("at", "where it was observed"),
-    _name("from", "the point that it counts from"),
-    _name("to", "the point that it counts to, clockwise"),
-    *angle_fields("angle", "from one to the other, clockwise", (-1, 1)),
+    _name("at", "point of observation"),
+    _name("from", "point sighted first, from which the angle is measured"),
+    _name("to", "point sighted second, to which the angle is measured, clockwise"),
+    *angle_fields("angle", "angle from the first point to the second, clockwise", (-1, 1)),
     _S_ARCSEC,
     USE,
 )
 VERTICAL_ANGLES = (
-    _name("from", "where it was observed"),
-    _name("to", "the point"),
-    *angle_fields("angle", "above the horizon", (-0.25, 0.25)),
+    _name("from", "point of observation"),
+    _name("to", "target point"),
+    *angle_fields("angle", "vertical angle above the horizontal", (-0.25, 0.25)),
     _S_ARCSEC,
     USE,
 )
 HEIGHT_DIFFERENCES = (
-    _name("from", "one end"),
-    _name("to", "the other end"),
-    _number("dz_m", "height of the second above the first, metres", -1e5, 1e5, True),
+    _name("from", "first point"),
+    _name("to", "second point"),
+    _number("dz_m", "height of the second point above the first, metres", -1e5, 1e5, True),
     _sd_mm("the difference"),
     USE,
 )
 PLUMB_LINES = (
-    _name("from", "one point of a vertical line"),
-    _name("to", "another point of it"),
-    _sd_mm("their offset in x and in y"),
+    _name("from", "first point of a vertical line"),
+    _name("to", "second point of the vertical line"),
+    _sd_mm("the horizontal offsets in x and in y"),
     USE,
 )
 VECTORS = (
-    _name("from", "one end"),
-    _name("to", "the other end"),
+    _name("from", "first point"),
+    _name("to", "second point"),
     *(
         _number(
-            f"d{axis}_m", f"{axis} of the second less {axis} of the first, metres", -1e8, 1e8, True
+            f"d{axis}_m",
+            f"{axis} of the second point minus {axis} of the first, metres",
+            -1e8,
+            1e8,
+            True,
         )
         for axis in "xyz"
     ),
@@ -272,17 +322,17 @@ VECTORS = (
 
 @dataclass(frozen=True)
 class SurveyTable:
-    """A table of a survey: its columns, and what its rows are.
+    """Columns of a table of a survey, and the kind of its rows.
 
     Attributes
     ----------
     columns : tuple of Field
     is_reading : bool
-        Its rows are readings between points.
+        Whether the rows are readings between points.
     angle : str
-        The angle that is read, whose columns carry its unit; "" for a table of lengths.
+        Name of the angle, whose columns end with a unit; "" for a table of lengths.
     may_correlate : bool
-        Its readings may be correlated with others (correlated_readings.csv).
+        Whether readings may be correlated with other readings (correlated_readings.csv).
     """
 
     columns: tuple[Field, ...]
@@ -291,11 +341,12 @@ class SurveyTable:
     may_correlate: bool = False
 
 
-def _read(columns, angle="", may_correlate=True):
+def _define_readings(columns, angle="", may_correlate=True):
+    """Return the `SurveyTable` of a table of readings."""
     return SurveyTable(columns, True, angle, may_correlate)
 
 
-# a new kind of reading is one line here, its columns above
+# A new kind of reading requires only a line here, and its columns above.
 TABLES = {
     "targets": SurveyTable(TARGETS),
     "photos": SurveyTable(PHOTOS),
@@ -305,33 +356,34 @@ TABLES = {
     "control": SurveyTable(CONTROL, may_correlate=True),
     "check": SurveyTable(CHECK),
     "setups": SurveyTable(SETUPS),
-    "distances": _read(DISTANCES),
-    "slope_distances": _read(SLOPE_DISTANCES),
-    "directions": _read(DIRECTIONS, "direction"),
-    "zenith_angles": _read(ZENITH_ANGLES, "zenith"),
-    "azimuths": _read(AZIMUTHS, "azimuth"),
-    "horizontal_angles": _read(HORIZONTAL_ANGLES, "angle"),
-    "vertical_angles": _read(VERTICAL_ANGLES, "angle"),
-    "height_differences": _read(HEIGHT_DIFFERENCES),
-    "plumb_lines": _read(PLUMB_LINES, may_correlate=False),
-    "vectors": _read(VECTORS),
+    "distances": _define_readings(DISTANCES),
+    "slope_distances": _define_readings(SLOPE_DISTANCES),
+    "directions": _define_readings(DIRECTIONS, "direction"),
+    "zenith_angles": _define_readings(ZENITH_ANGLES, "zenith"),
+    "azimuths": _define_readings(AZIMUTHS, "azimuth"),
+    "horizontal_angles": _define_readings(HORIZONTAL_ANGLES, "angle"),
+    "vertical_angles": _define_readings(VERTICAL_ANGLES, "angle"),
+    "height_differences": _define_readings(HEIGHT_DIFFERENCES),
+    "plumb_lines": _define_readings(PLUMB_LINES, may_correlate=False),
+    "vectors": _define_readings(VECTORS),
 }
 CORRELATED_READINGS = (
     *(
         field
-        for number, which in (("1", "one value"), ("2", "the other value"))
+        for number, which in (("1", "first value"), ("2", "second value"))
         for field in (
             Field(
                 f"table_{number}",
                 "choice",
-                f"{which}: the table in which it stands",
+                f"{which}: table that contains it",
                 required=True,
-                choices=tuple(name for name, one in TABLES.items() if one.may_correlate),
+                choices=tuple(name for name, table in TABLES.items() if table.may_correlate),
             ),
             Field(
                 f"row_{number}",
                 "number",
-                f"{which}: its row there, as the sheet numbers it; in a CSV file the heading is 1",
+                f"{which}: row in that table, as numbered in the sheet; the heading of a CSV"
+                " file is row 1",
                 required=True,
                 low=2,
                 high=1e7,
@@ -339,19 +391,19 @@ CORRELATED_READINGS = (
             Field(
                 f"value_{number}",
                 "choice",
-                f"{which}: x, y or z of control and of vectors; blank: the only one of its row",
+                f"{which}: x, y or z of control and of vectors; blank: the only value of the row",
                 choices=("x", "y", "z"),
             ),
         )
     ),
-    _number("r", "their correlation", -1, 1, True),
+    _number("r", "correlation of the two values", -1, 1, True),
 )
 
-COLUMNS = {name: one.columns for name, one in TABLES.items()}
+COLUMNS = {name: table.columns for name, table in TABLES.items()}
 COLUMNS["correlated_readings"] = CORRELATED_READINGS
-READINGS = tuple(name for name, one in TABLES.items() if one.is_reading)
-ANGLES = {name: one.angle for name, one in TABLES.items() if one.angle}
-# tables of each usual kind of survey; those of the other kind may be added
+READINGS = tuple(name for name, table in TABLES.items() if table.is_reading)
+ANGLES = {name: table.angle for name, table in TABLES.items() if table.angle}
+# Tables of each usual kind of survey; tables of the other kind may be added.
 SURVEYS = {
     "photos": (
         *("photos", "image_points", "targets", "control", "check", "distances"),

@@ -1,4 +1,4 @@
-"""The keys of [mesh], [corrections], [checks] and [inspection]: most are for some kinds only."""
+"""Keys of [mesh], [corrections], [checks] and [inspection], most of them for some kinds only."""
 
 from tankcal.job.contract.kinds import LOADED, VERTICAL, WITH_POINTS
 from tankcal.job.contract.shorthand import choice, number, positive
@@ -12,13 +12,13 @@ MESH = (
     Field(
         "file",
         "mesh file",
-        "name of the file of the mesh, beside job.toml or the workbook: .stl, .obj, .ply or .off",
+        "file of the mesh, beside job.toml or the workbook: .stl, .obj, .ply or .off",
         required=True,
         kinds=("mesh",),
     ),
     choice(
         "unit",
-        "unit of the coordinates in that file",
+        "unit of the coordinates in the mesh file",
         tuple(MESH_UNITS_M),
         required=True,
         kinds=("mesh",),
@@ -27,6 +27,7 @@ MESH = (
 
 
 def _switch(name, note, kinds=()):
+    """Return the key of a correction that can be switched off."""
     return Field(name, "flag", f"{note}; blank: true", kinds=kinds)
 
 
@@ -34,7 +35,7 @@ CORRECTIONS = (
     _switch("plate", "subtract the plates from an outside survey", WITH_POINTS),
     _switch("paint", "subtract the paint from an outside survey", VERTICAL),
     _switch("temperature", "bring the shell to the reference temperature"),
-    _switch("head", "load the shell with the liquid head, a sphere with its pressure, too", LOADED),
+    _switch("head", "load the shell with the liquid head, and a sphere with its pressure", LOADED),
     _switch("tilt", "take the tilt into account", ("vertical", "horizontal")),
     _switch("bottom", "take the form of the bottom into account", VERTICAL),
     _switch("top", "take the head on top into account", VERTICAL),
@@ -51,54 +52,55 @@ CHECKS = (
     ),
     choice(
         "service",
-        "ambient, heated or refrigerated: what temperatures are plausible; blank: ambient",
+        "service of the tank, which sets the plausible temperatures: ambient, heated or"
+        " refrigerated; blank: ambient",
         SERVICES,
     ),
     number(
         "air_temperature_c",
-        "temperature of the air during the survey, degrees Celsius; the shell's is near it",
+        "air temperature during the survey, degrees Celsius; compared with the shell temperature",
         -80,
         150,
     ),
     number(
         "top_z_m",
-        "z of the top of the shell as surveyed, in the frame of the points, metres; bottom_z_m and"
-        " the courses lead there",
+        "z of the top of the shell as surveyed, in the frame of the points, metres; compared"
+        " with bottom_z_m and the courses",
         -1e5,
         1e5,
         kinds=VERTICAL,
     ),
     choice(
         "bottom_slopes",
-        "cone and dish: the bottom goes up or down from its edge to its centre",
+        "cone and dish: slope of the bottom from its edge to its centre, up or down",
         ("up", "down"),
         kinds=VERTICAL,
     ),
     number(
         "circumference_m",
-        "circumference of the first course by tape, outside, square to the axis, metres",
+        "circumference of the first course by tape, outside, perpendicular to the axis, metres",
         0.3,
         1000,
         kinds=VERTICAL,
     ),
     choice(
         "diameter_is",
-        "what tank.nominal_diameter_m is by the drawing, to the millimetre: inside, middle (of the"
-        " plates of the first course) or outside; blank: not known",
+        "diameter that tank.nominal_diameter_m states, to the millimetre: inside, middle (of"
+        " the plates of the first course) or outside; blank: not known",
         DIAMETERS,
         kinds=WITH_POINTS,
     ),
     positive(
         "diameter_within_mm",
-        "by how much the diameter as built may differ from tank.nominal_diameter_m where that is a"
-        " rounded figure, millimetres; blank: 1 in 500 of it",
+        "largest difference of the diameter as built from a rounded tank.nominal_diameter_m,"
+        " millimetres; blank: 1 in 500 of the diameter",
         500,
         kinds=WITH_POINTS,
     ),
     choice(
         "targets",
-        "how targets are fixed to the wall: flat (film or thin magnets) or raised (prisms, balls or"
-        " targets in holders); blank: flat",
+        "mounting of the targets on the wall: flat (film or thin magnets) or raised (prisms,"
+        " balls or targets in holders); blank: flat",
         TARGETS,
         kinds=WITH_POINTS,
     ),
@@ -114,13 +116,13 @@ INSPECTION = (
     Field(
         "rule",
         "rule name",
-        "rule that tankcal inspect judges the tank by: api_653, api_650 or a .toml file beside"
-        " job.toml; blank: api_653",
+        "rule for tankcal inspect: api_653, api_650 or a .toml file beside job.toml; blank:"
+        " api_653",
         kinds=VERTICAL,
     ),
     positive(
         "yield_mpa",
-        "yield stress of the shell's steel, MPa; limits of settlement need it",
+        "yield stress of the shell's steel, MPa; needed for limits of settlement",
         MOST_YIELD_MPA,
         kinds=VERTICAL,
     ),

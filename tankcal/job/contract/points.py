@@ -1,4 +1,4 @@
-"""points.csv: its columns, and the checks of it alone: names and places once, sections complete."""
+"""Columns of points.csv, and checks of its names, coordinates, sections and standard deviations."""
 
 from tankcal.job.checking import refuse_repeated, tiny_sd
 from tankcal.job.contract.shorthand import number, positive
@@ -7,6 +7,7 @@ from tankcal.messages import message
 
 
 def _sd(axis):
+    """Return the column of the standard deviation of a coordinate."""
     return positive(
         f"s{axis}_mm",
         f"standard deviation of {axis}, millimetres; for all points or for none",
@@ -16,12 +17,13 @@ def _sd(axis):
 
 
 def _coordinate(axis, limit):
+    """Return the column of a coordinate."""
     note = f"coordinate {axis}, metres"
     return number(f"{axis}_m", note, -limit, limit, required=True)
 
 
 COLUMNS = (
-    Field("point", "name", "name of the point, once in the file", required=True),
+    Field("point", "name", "name of the point, unique in the file", required=True),
     _coordinate("x", 1e8),
     _coordinate("y", 1e8),
     _coordinate("z", 1e5),
@@ -32,12 +34,13 @@ COLUMNS = (
     Field("generatrix", "name", "name of the vertical line of points"),
 )
 
-MAX_POINTS = 50_000
+MAX_POINTS = 50_000  # the record contains every point
+# If all standard deviations are below: warning, problem (probably in another unit).
 TINY_SD_MM, SURELY_TINY_SD_MM = 0.01, 0.0001
 
 
 def check_points(points, log):
-    """Point names once, places once (a warning), credible and complete standard deviations."""
+    """Check number, names, places, sections and standard deviations of the points."""
     if not points.rows and not points.skipped:
         log.problem(
             points.file,
@@ -47,8 +50,8 @@ def check_points(points, log):
     if len(points.rows) > MAX_POINTS:
         expected = message(
             "points_too_many",
-            "{count} points; expected at most {most}, for the record keeps each of them: hand a"
-            " larger scan in as its files (clouds.toml), of which any number is read",
+            "{count} points; expected at most {most}, because the record contains every point:"
+            " declare the files of a larger scan in clouds.toml",
             count=len(points.rows),
             most=MAX_POINTS,
         )
@@ -67,13 +70,14 @@ def check_points(points, log):
             )
             log.problem(points.file, expected, None, name)
     for name in given:
-        found = [sd for sd in points.of(name) if sd is not None]
-        if found and max(found) < TINY_SD_MM:
-            tell = log.problem if max(found) < SURELY_TINY_SD_MM else log.warning
-            tell(points.file, tiny_sd("mm", max(found)), None, name)
+        values = [sd for sd in points.of(name) if sd is not None]
+        if values and max(values) < TINY_SD_MM:
+            report = log.problem if max(values) < SURELY_TINY_SD_MM else log.warning
+            report(points.file, tiny_sd("mm", max(values)), None, name)
 
 
 def _warn_same_places(points, log):
+    """Warn of points with equal coordinates."""
     first_row = {}
     places = zip(points.of("x_m"), points.of("y_m"), points.of("z_m"), strict=True)
     for row, place in zip(points.rows, places, strict=True):
@@ -82,7 +86,7 @@ def _warn_same_places(points, log):
         if place in first_row:
             expected = message(
                 "same_coordinates",
-                "the same coordinates as row {row}; counted once",
+                "coordinates of row {row} again; counted once",
                 row=first_row[place],
             )
             log.warning(points.file, expected, row, "x_m")
@@ -91,7 +95,7 @@ def _warn_same_places(points, log):
 
 
 def _refuse_some_sections(points, log):
-    """A section for every point or for none: else some would be placed by height, some by name."""
+    """Refuse sections of some points only, because the other points would be assigned by height."""
     sections = points.of("section")
     if not any(sections):
         return

@@ -1,25 +1,25 @@
-"""The radii of a shell that a former table, a record or a declaration gives: radii.csv, [radii],
-and how they may have changed since, [change]."""
+"""Former radii of a shell (radii.csv, [radii]) and their possible change since then ([change])."""
 
 from tankcal.job.contract.kinds import VERTICAL
 from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.fields import Field
 
-SOURCES = TABLE, RECORD, DECLARED = ("table", "record", "declared")  # where radii come from
-MOST_MM = 1000  # of an uncertainty of a radius
+SOURCES = TABLE, RECORD, DECLARED = ("table", "record", "declared")  # sources of the radii
+MOST_MM = 1000  # largest uncertainty of a radius
 
 RADII = (
-    Field("course", "name", "course of courses.csv, each once", required=True),
+    Field("course", "name", "course of courses.csv, unique in the file", required=True),
     number(
         "radius_m",
-        "radius inside of the circle of the course's mean area, shell empty, metres; blank only"
-        " where the course was measured again",
+        "inside radius of the circle with the mean area of the course, shell empty, metres;"
+        " blank only if the course was measured again",
         0.3,
         150,
     ),
     number(
         "u_mm",
-        "standard uncertainty that this radius has for itself, millimetres; blank: 0",
+        "standard uncertainty of this radius, independent of the other radii, millimetres;"
+        " blank: 0",
         0,
         MOST_MM,
     ),
@@ -28,51 +28,51 @@ COLUMNS = {"radii": RADII}
 
 
 def _mm(name, note):
+    """Return a key for an uncertainty of a radius, millimetres."""
     return number(name, note, 0, MOST_MM, kinds=VERTICAL)
 
 
 SETTINGS = (
     choice(
         "source",
-        "where the radii come from: table (read out of a former table), record (a saved result)"
-        " or declared; needed with radii.csv",
+        "source of the radii: table (read from a former table), record (a saved result) or"
+        " declared; needed with radii.csv",
         SOURCES,
         kinds=VERTICAL,
     ),
     _mm(
         "u_common_mm",
-        "standard uncertainty that all radii have in common, millimetres (0: none); needed with"
-        " radii.csv",
+        "standard uncertainty common to all radii, millimetres (0: none); needed with radii.csv",
     ),
     number(
         "reference_temperature_c",
-        "shell temperature that the radii are for, degrees Celsius; blank: that of the table",
+        "reference temperature of the radii, degrees Celsius; blank: that of the table",
         -200,
         300,
         kinds=VERTICAL,
     ),
     Field(
-        "note", "text", "where the radii were found, such as the former certificate; printed",
+        "note", "text", "document with the radii, such as the former certificate; printed",
         kinds=VERTICAL,
     ),
 )  # fmt: skip
 CHANGE = (
     _mm(
         "common_mm",
-        "standard uncertainty of how all radii may have changed together since then, millimetres"
-        " (0: not at all); needed where courses were measured again",
+        "standard uncertainty of a change common to all radii since then, millimetres (0:"
+        " none); needed if courses were measured again",
     ),
     _mm(
         "own_mm",
-        "standard uncertainty of how each radius may have changed for itself, millimetres (0: not"
-        " at all); needed where courses were measured again",
+        "standard uncertainty of an independent change of each radius since then, millimetres"
+        " (0: none); needed if courses were measured again",
     ),
     _mm(
         "shared_mm",
-        "standard uncertainty that the former radii and the new survey have in common, of one"
-        " tape, millimetres; blank: nothing",
+        "standard uncertainty common to the former radii and the new survey, such as of one"
+        " tape, millimetres; blank: 0",
     ),
 )
 KEYS = {"radii": SETTINGS, "change": CHANGE}
-NEEDED = ("source", "u_common_mm")  # of [radii], with radii.csv
-NEEDED_OF_CHANGE = ("common_mm", "own_mm")  # of [change], with a survey
+NEEDED = ("source", "u_common_mm")  # keys of [radii] required with radii.csv
+NEEDED_OF_CHANGE = ("common_mm", "own_mm")  # keys of [change] required with a survey

@@ -1,4 +1,4 @@
-"""The keys of cameras.toml, instruments.toml, clouds.toml, meters.toml, [adjustment.camera]."""
+"""Keys of cameras.toml, instruments.toml, clouds.toml, meters.toml and [adjustment.camera]."""
 
 from tankcal.camera.comparator import KINDS as TRANSFORMATIONS
 from tankcal.camera.model import AFFINITIES, CONVENTIONS
@@ -13,7 +13,7 @@ from tankcal.job.fields import Field
 from tankcal.survey.network.survey import STATES
 
 INSTRUMENT_KINDS = ("tape", "edm", "total_station", "theodolite", "level", "plummet", "stadia")
-# name in cameras.toml and largest magnitude of each parameter, by its name in tankcal.camera.model
+# Key in cameras.toml and largest magnitude of each parameter of tankcal.camera.model.
 PARAMETER_KEYS = {
     "c": ("c_mm", 1e5),
     "x0": ("x0_mm", 1e4),
@@ -29,28 +29,30 @@ PARAMETER_KEYS = {
     "A": ("A", 0.1),
     "B": ("B", 0.1),
 }
-SECOND_NAMES = {"A": "b1", "B": "b2"}  # of the form b1_b2
+SECOND_NAMES = {"A": "b1", "B": "b2"}  # names of the parameters in the form b1_b2
 _NOTES = {
     "c": "principal distance, millimetres",
     "x0": "principal point, to the right of the middle of the format, millimetres",
     "y0": "principal point, above the middle of the format, millimetres",
-    "A": "affinity, in the form of the key affinity",
-    "B": "affinity, in the form of the key affinity",
-    "b1": "in place of A, of the form b1_b2",
-    "b2": "in place of B, of the form b1_b2",
+    "A": "affinity, in the form set by the key affinity",
+    "B": "affinity, in the form set by the key affinity",
+    "b1": "affinity in place of A, for the form b1_b2",
+    "b2": "affinity in place of B, for the form b1_b2",
 }
 
 
 def _note(name):
+    """Return the note of a parameter."""
     kind = "radial" if name.startswith("K") else "decentring"
     return _NOTES.get(name, f"{kind} distortion {name}")
 
 
 def _value(name, key=None):
-    own_key, largest = PARAMETER_KEYS[name]
+    """Return the key of the value of a parameter, or another key for it."""
+    usual_key, largest = PARAMETER_KEYS[name]
     low = 0 if name == "c" else -largest
     return Field(
-        key or own_key,
+        key or usual_key,
         "number",
         _note(key or name),
         required=name == "c",
@@ -61,25 +63,26 @@ def _value(name, key=None):
 
 
 def sd_key(name):
-    """Key of the standard deviation of a parameter, in the unit of its value."""
+    """Return the key of the standard deviation of a parameter, in the unit of its value."""
     return f"s_{name}_mm" if name in ("c", "x0", "y0") else f"s_{name}"
 
 
 def _sd(name, of=None):
-    note = f"standard deviation of {name}, in the unit of its value; 0: held"
+    """Return the key of a standard deviation; of: parameter whose bound applies, if not `name`."""
+    note = f"standard deviation of {name}, in the unit of the parameter; 0: held fixed"
     return Field(sd_key(name), "number", note, low=0, high=PARAMETER_KEYS[of or name][1])
 
 
 AFFINITIES_BY_AUTHOR = {"silva": "both_y", "pessoa": "both_x"}
 MARKS = "marks"
 FOCUS_CALIBRATIONS = "focus_calibrations"
-# [cameras.NAME.marks] has keys of the user's own, each with the same kind of value
+# Keys chosen by the user in [cameras.NAME.marks], all with one kind of value.
 FAMILIES = {
     "cameras": {
         MARKS: Field(
             MARKS,
             "numbers",
-            "calibrated place of a fiducial mark, millimetres from the middle: [-83.01, 0.02]",
+            "calibrated position of a fiducial mark, millimetres from the middle: [-83.01, 0.02]",
             low=-1e3,
             high=1e3,
         )
@@ -89,7 +92,7 @@ _FOCUS = (
     Field(
         "focus_m",
         "number",
-        "distance that the lens is focused at, metres; with focus_calibrations, in place of K",
+        "focus distance of the lens, metres; with focus_calibrations, in place of K",
         low=0,
         above_low=True,
         high=1e9,
@@ -133,7 +136,7 @@ CAMERA = (
     Field(
         "format_px",
         "numbers",
-        "or columns and lines of the image, with pixel_um: [6000, 4000]",
+        "in place of format_mm: columns and lines of the image, with pixel_um: [6000, 4000]",
         low=0,
         above_low=True,
         high=1e6,
@@ -160,21 +163,21 @@ CAMERA = (
     Field(
         "radial_balance_mm",
         "number",
-        "radius without radial distortion, of the balanced form, millimetres; blank: 0",
+        "radius of zero radial distortion, of the balanced form, millimetres; blank: 0",
         low=0,
         high=1000,
     ),
     Field(
         "convention",
         "choice",
-        "what K and P do: correction_added, correction_subtracted or distortion_of_ideal; needed"
-        " with any of them",
+        "sign convention of K and P: correction_added, correction_subtracted or"
+        " distortion_of_ideal; needed with any K or P",
         choices=tuple(CONVENTIONS),
     ),
     Field(
         "fiducial_transformation",
         "choice",
-        "of comparator readings through the marks in fiducials.csv; blank: affine",
+        "transformation of comparator readings with the marks in fiducials.csv; blank: affine",
         choices=tuple(TRANSFORMATIONS),
     ),
     *_FOCUS,
@@ -183,22 +186,22 @@ INSTRUMENT = (
     Field(
         "kind",
         "text",
-        f"{', '.join(INSTRUMENT_KINDS)}, or another one",
+        f"{', '.join(INSTRUMENT_KINDS)}, or another kind",
         required=True,
         choices=INSTRUMENT_KINDS,
     ),
-    Field("certificate", "text", "number of its certificate; printed when given"),
+    Field("certificate", "text", "number of the instrument's certificate; printed if given"),
     Field(
         "certified_temperature_c",
         "number",
-        "temperature that the certificate is for, degrees Celsius",
+        "reference temperature of the certificate, degrees Celsius",
         low=-60,
         high=90,
     ),
     Field(
         "tension_n",
         "number",
-        "pull that the certificate of a tape is for, newtons",
+        "tension stated in the certificate of a tape, newtons",
         low=0,
         high=1000,
     ),
@@ -206,21 +209,21 @@ INSTRUMENT = (
     Field(
         "correction",
         "number",
-        "of the scale: true = reading (1 + correction); blank: 0",
+        "correction of the scale: true = reading (1 + correction); blank: 0",
         low=-0.1,
         high=0.1,
     ),
     Field(
         "correction_mm",
         "number",
-        "added to each reading, millimetres; blank: 0",
+        "correction added to each reading, millimetres; blank: 0",
         low=-1e4,
         high=1e4,
     ),
     Field(
         "u_scale_ppm",
         "number",
-        "standard uncertainty of the scale, ppm; free: an unknown; blank: 0",
+        "standard uncertainty of the scale, ppm; free: estimated as an unknown; blank: 0",
         low=0,
         high=1e5,
         choices=(FREE,),
@@ -228,7 +231,7 @@ INSTRUMENT = (
     Field(
         "u_offset_mm",
         "number",
-        "standard uncertainty of the offset, millimetres; free: an unknown; blank: 0",
+        "standard uncertainty of the offset, millimetres; free: estimated as an unknown; blank: 0",
         low=0,
         high=1e4,
         choices=(FREE,),
@@ -241,16 +244,19 @@ SCOPES_AND_STATES = (
 
 
 def _override(name, note):
+    """Return a key for the scope and state of a camera parameter."""
     return Field(name, "choice", note, choices=SCOPES_AND_STATES, of_survey=True)
 
 
 CAMERA_SETTINGS = (
-    _override("default", "of c x0 y0 K1 K2 K3 P1 P2 and the affinity; blank: camera free"),
+    _override(
+        "default", "scope and state of c x0 y0 K1 K2 K3 P1 P2 and the affinity; blank: camera free"
+    ),
     *(_override(name, _note(name)) for name in PARAMETER_KEYS),
     *(_override(key, _note(key)) for key in SECOND_NAMES.values()),
 )
 
-# other spellings of keys, of the same meaning and unit: K1 for K1_mm-2, s_c for s_c_mm
+# Alternative spellings of keys, with equal meaning and unit: K1 for K1_mm-2, s_c for s_c_mm.
 SHORT_KEYS = {
     "cameras": {key: name for name, (key, _) in PARAMETER_KEYS.items() if name[0] in "KP"}
     | {sd_key(name): f"s_{name}" for name in ("c", "x0", "y0")},
@@ -275,5 +281,5 @@ REGISTERS_OF_SURVEY = {
     "cloud": ("clouds", "instruments"),
     "liquid": ("meters",),
 }
-# keys of [adjustment] that need photographs
+# Keys of [adjustment] that require photographs.
 OF_PHOTOS = ("fixed_photo", "image_sd_um", "reading_limit_um", "depth_of_field", "image_weights")

@@ -1,4 +1,4 @@
-"""rings.csv: the rings of a lying cylinder, from end A to end B, and checks of it alone."""
+"""Columns of rings.csv, the rings of a horizontal cylinder from end A to end B, and its checks."""
 
 from itertools import pairwise
 
@@ -14,14 +14,15 @@ RINGS = (
     positive("length_m", "length of the ring along the axis, metres", 50, required=True),
     number(
         "thickness_mm",
-        "plate thickness, millimetres; blank: as the readings of the table thickness say",
+        "plate thickness, millimetres; blank: mean of the readings in the table thickness",
         0,
         100,
     ),
     number("paint_mm", "thickness of the paint, millimetres; blank: 0", 0, 10),
     choice(
         "lap",
-        "of lap-jointed rings: inner or outer, for all of them; only compared; blank: not known",
+        "lap of lap-jointed rings: inner or outer, for all rings or for none; only compared;"
+        " blank: not known",
         LAPS,
         in_full=True,
     ),
@@ -29,13 +30,23 @@ RINGS = (
 COLUMNS = {"rings": RINGS}
 
 MOST_RINGS = 100
-MISS_M, MISS_RELATIVE = 0.020, 0.002  # of the sum of the rings from the length of the cylinder
+# Largest difference of the sum of the rings from the length of the cylinder: metres, or relative.
+MISS_M, MISS_RELATIVE = 0.020, 0.002
 
 
 def check_rings_alone(rings, gauged, values, log):
-    """Ring names once, plates that are known and credible, lengths that add up, laps in turn.
+    """Check names, plates, lengths and laps of the rings.
 
-    gauged  names of rings whose plates a gauge read
+    Parameters
+    ----------
+    rings : ColumnValues
+        Rows of rings.csv.
+    gauged : set of str
+        Names of the rings with readings of a thickness gauge.
+    values : dict or None
+        Values of job.toml.
+    log
+        Log of the problems.
     """
     refuse_repeated(rings, "ring", log)
     if len(rings.rows) > MOST_RINGS:
@@ -53,8 +64,8 @@ def check_rings_alone(rings, gauged, values, log):
         if thickness is None and name not in gauged:
             expected = message(
                 "ring_without_plate",
-                "blank; expected the plate's thickness: the tape lay outside, and no reading of a"
-                " gauge says it",
+                "blank; expected the plate's thickness: the tape was outside, and the table"
+                " thickness has no reading of this ring",
             )
             log.problem(rings.file, expected, row, "thickness_mm")
         elif thickness is not None and 0 < thickness < SMALLEST_THICKNESS_MM:
@@ -62,16 +73,16 @@ def check_rings_alone(rings, gauged, values, log):
     if values is not None:
         _check_sum(rings, values["horizontal"]["length_m"], log)
     laps = rings.of("lap")
-    if None not in laps and any(one == other for one, other in pairwise(laps)):
+    if None not in laps and any(lap == next_lap for lap, next_lap in pairwise(laps)):
         expected = message(
             "laps_not_in_turn",
-            "rings that touch are both inner, or both outer: lap-jointed rings are inner and outer"
-            " in turn",
+            "adjacent rings are both inner, or both outer; lap-jointed rings alternate",
         )
         log.warning(rings.file, expected, None, "lap")
 
 
 def _check_sum(rings, whole_m, log):
+    """Check that the rings add up to the length of the cylinder, m."""
     lengths = rings.of("length_m")
     if whole_m is None or None in lengths or rings.skipped:
         return

@@ -1,4 +1,4 @@
-"""[roof]: its keys; all of them or none, and a roof of a credible size for the tank."""
+"""Keys of [roof], and checks that they are complete and plausible for the tank."""
 
 from tankcal.job.checking import RELATIVE_DENSITY, is_not_given, missing_beside, tell
 from tankcal.job.contract.kinds import VERTICAL
@@ -9,43 +9,45 @@ from tankcal.messages import message
 KEYS = (
     positive(
         "mass_kg",
-        "floating roof: its mass with all that floats with it, kilograms; blank: no floating roof",
+        "floating roof: mass of the roof and all that floats with it, kilograms; blank: no"
+        " floating roof",
         1e7,
         kinds=VERTICAL,
     ),
     number(
         "critical_bottom_m",
-        "dip at which the liquid first touches it, from the table's zero, metres",
+        "dip at which the liquid first touches the roof, from the table's zero, metres",
         0,
         100,
         kinds=VERTICAL,
     ),
     number(
         "critical_top_m",
-        "dip at which it floats freely, from the table's zero, metres",
+        "dip at which the roof floats freely, from the table's zero, metres",
         0,
         100,
         kinds=VERTICAL,
     ),
     positive(
         "reference_density_kg_m3",
-        "density of the liquid that the table is for, kg/m3",
+        "density of the liquid for the table, kg/m3",
         3000,
         kinds=VERTICAL,
     ),
     choice(
         "weighing",
-        "what the mass was weighed in, or reduced to: air or vacuum",
+        "mass as weighed in, or reduced to, air or vacuum",
         ("air", "vacuum"),
         kinds=VERTICAL,
     ),
 )
 
-LIGHTEST_KG_M2, HEAVIEST_KG_M2 = 1.0, 1000.0  # aluminium skins have 5, steel double decks 120
+# Possible mass per area of the tank; aluminium skins have 5 kg/m2, steel double decks 120 kg/m2.
+LIGHTEST_KG_M2, HEAVIEST_KG_M2 = 1.0, 1000.0
 
 
 def upside_down(low, high):
-    """What is said of a critical_top_m that is not above critical_bottom_m."""
+    """Return the message for a critical_top_m that is not above critical_bottom_m."""
     return message(
         "roof_upside_down",
         "found {high:g}; expected above critical_bottom_m = {low:g}",
@@ -55,7 +57,7 @@ def upside_down(low, high):
 
 
 def check_roof(roof, extent, raw, log):
-    """All keys or none; critical heights in order and within the shell; a mass that can float."""
+    """Check that all keys are given or none, and critical heights and mass are plausible."""
     names = [field.name for field in KEYS]
     given = [name for name in names if not is_not_given(raw, "roof", name)]
     for name in names:
@@ -81,6 +83,7 @@ def check_roof(roof, extent, raw, log):
 
 
 def _check_mass(roof, area, raw, log):
+    """Check the mass against the cross-section of the tank, m2, and the draught of the roof."""
     mass, density = roof["mass_kg"], roof["reference_density_kg_m3"]
     if not LIGHTEST_KG_M2 <= mass / area <= HEAVIEST_KG_M2:
         guess = message("in_grams", "is it in grams?")

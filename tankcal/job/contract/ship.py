@@ -1,4 +1,4 @@
-"""[ship]: its keys; marks, trims, lists and a sounding pipe of a tank of a ship or barge."""
+"""Keys of [ship] (draught marks, trims, lists and sounding pipe of a ship's tank), and checks."""
 
 from itertools import product
 from math import hypot, radians, tan
@@ -11,18 +11,19 @@ from tankcal.job.fields import Field
 from tankcal.messages import message
 
 MESH_ONLY = ("mesh",)
-BOW_DEG = 90.0  # the bow is towards +x where nothing else is said
+BOW_DEG = 90.0  # default direction of the bow, +x
 
 
 def _several(name, note, high):
+    """Return a key for several numbers of magnitude up to `high`."""
     return Field(name, "numbers", note, low=-high, high=high, kinds=MESH_ONLY)
 
 
 KEYS = (
     _several(
         "trim_m",
-        "trims that corrections are tabled for, draught aft less draught forward, metres; negative:"
-        " by the bow; blank, as all of [ship]: not a tank of a ship",
+        "trims of the correction tables, draught aft minus draught forward, metres; negative:"
+        " by the bow; blank, like all of [ship]: not a tank of a ship",
         30,
     ),
     positive(
@@ -33,7 +34,7 @@ KEYS = (
     ),
     _several(
         "list_deg",
-        "lists that corrections are tabled for, degrees; to starboard positive, to port negative",
+        "lists of the correction tables, degrees; positive to starboard, negative to port",
         45,
     ),
     number(
@@ -50,21 +51,21 @@ KEYS = (
     ),
     _several(
         "pipe_bottom_m",
-        "lower end of the sounding pipe, which soundings count from: x; y; z in the frame of the"
+        "lower end of the sounding pipe, the zero of the soundings: x; y; z in the frame of the"
         " mesh, metres",
         1e8,
     ),
     positive(
         "correction_step_m",
-        "step of the soundings that corrections are tabled for, metres; blank: chosen, about a"
+        "step of the soundings in the correction tables, metres; blank: chosen for about a"
         " hundred soundings",
         10,
         kinds=MESH_ONLY,
     ),
     number(
         "contraction_percent",
-        "how much all lengths of the tank are shorter in service than as measured, percent, the"
-        " same everywhere; blank: not at all",
+        "uniform contraction of all lengths of the tank in service, relative to the survey,"
+        " percent; blank: 0",
         -1,
         2,
         kinds=MESH_ONLY,
@@ -73,18 +74,18 @@ KEYS = (
 
 NEEDED = ("trim_m", "length_between_marks_m", "list_deg", "pipe_top_m", "pipe_bottom_m")
 ENDS = ("pipe_top_m", "pipe_bottom_m")
-STEEPEST_TRIM = 0.2  # tangent: beyond, draughts and marks are not in one unit
-LEAST_RISE = 0.2  # of the surface for each metre of pipe: a flatter one cannot be sounded
-MOST_CELLS = 400  # trims times lists
+STEEPEST_TRIM = 0.2  # tangent; larger: draughts and marks are in different units
+LEAST_RISE = 0.2  # rise of the surface per metre of pipe that soundings require
+MOST_CELLS = 400  # largest number of pairs of trim and list
 
 
 def is_ship(values):
-    """Is it a tank of a ship, by what could be read of [ship]?"""
+    """Determine whether the tank is a ship's tank, from the readable keys of [ship]."""
     return any(values["ship"][name] is not None for name in NEEDED)
 
 
 def check_ship(values, tables, raw, log):
-    """All that is needed or nothing, credible trims, a pipe that stands upright at all of them."""
+    """Check that [ship] is complete or blank, with plausible trims and a usable sounding pipe."""
     given = [field.name for field in KEYS if not is_not_given(raw, "ship", field.name)]
     if not given:
         return
@@ -98,14 +99,15 @@ def check_ship(values, tables, raw, log):
     ship = values["ship"]
     _check_grid(ship, refuse)
     _check_pipe(ship, refuse)
-    _refuse_others(values, tables, log, refuse)
+    _refuse_other_parts(values, tables, log, refuse)
 
 
 def _check_grid(ship, refuse):
+    """Check trims and lists: each once, of plausible size and number."""
     length = ship["length_between_marks_m"]
     for name in ("trim_m", "list_deg"):
-        found = ship[name] or ()
-        if len(set(found)) < len(found):
+        values = ship[name] or ()
+        if len(set(values)) < len(values):
             refuse(name, message("ship_grid_twice", "a value is given twice; expected each once"))
     if length is not None and ship["trim_m"]:
         steepest = max(ship["trim_m"], key=abs)
@@ -131,6 +133,7 @@ def _check_grid(ship, refuse):
 
 
 def _check_pipe(ship, refuse):
+    """Check the ends of the sounding pipe."""
     for name in ENDS:
         if ship[name] is not None and len(ship[name]) != 3:
             expected = message(
@@ -156,14 +159,17 @@ def _check_pipe(ship, refuse):
 
 
 def _check_rise(ship, refuse):
-    """Rising enough at all pairs; a pipe that does not at even keel is told alone."""
+    """Check that the pipe rises sufficiently at even keel and at all pairs of trim and list.
+
+    Only the first failure is reported.
+    """
     from tankcal.tank.ships import Pipe, in_ship_frame
 
     bow = BOW_DEG if ship["bow_azimuth_deg"] is None else ship["bow_azimuth_deg"]
     ends = in_ship_frame([ship["pipe_bottom_m"], ship["pipe_top_m"]], radians(bow))
     pipe = Pipe(*np.asarray(ends))
     trims = (0.0, *(trim / ship["length_between_marks_m"] for trim in ship["trim_m"]))
-    lists = (0.0, *(tan(radians(one)) for one in ship["list_deg"]))
+    lists = (0.0, *(tan(radians(list_deg)) for list_deg in ship["list_deg"]))
     for trim, list_ in product(trims, lists):
         rise = pipe.rise(trim, list_) / hypot(1.0, trim, list_)
         if rise < LEAST_RISE:
@@ -180,8 +186,8 @@ def _check_rise(ship, refuse):
             return
 
 
-def _refuse_others(values, tables, log, refuse):
-    """What has no place beside a pipe: another zero, things between dips, a second temperature."""
+def _refuse_other_parts(values, tables, log, refuse):
+    """Refuse parts that contradict a sounding pipe: another zero, deadwood, runs, a temperature."""
     if values["datum"]["dip_plate_z_m"] is not None:
         expected = message(
             "ship_dip_plate",
@@ -191,13 +197,15 @@ def _refuse_others(values, tables, log, refuse):
     if has_rows(tables["deadwood"]):
         expected = message(
             "ship_deadwood",
-            "given beside [ship]; expected what stands in the tank as a hollow of the mesh: of "
-            "deadwood by dips nobody knows where it is",
+            "given beside [ship]; expected objects in the tank as cavities of the mesh:"
+            " deadwood given by dips has no horizontal position",
         )
         log.problem(tables["deadwood"].file, expected)
     if has_rows(tables["liquid"]):
         expected = message(
-            "ship_liquid", "given beside [ship]; expected only one of them: runs know no pipe"
+            "ship_liquid",
+            "given beside [ship]; expected only one of them: metered runs do not"
+            " use a sounding pipe",
         )
         log.problem(tables["liquid"].file, expected)
     contracted = values["ship"]["contraction_percent"] is not None

@@ -1,18 +1,18 @@
-"""The table of stadia readings: a bar of known length, and the angle between its ends."""
+"""Table of stadia readings: horizontal angles between the ends of a bar of known length."""
 
 from tankcal.job.contract.observations import USE, angle_fields
 from tankcal.job.fields import Field
 
-LEAST = 3e-4  # of a turn: 2 m at 1 km; a bar farther away tells no distance
+LEAST = 3e-4  # least angle in turns: a bar of 2 m at 1 km, beyond which no distance is determined
 STADIA = (
-    Field("setup", "name", "the set-up that reads it, as in setups.csv", required=True),
-    Field("to", "name", "the station that the middle of the bar stands over", required=True),
-    Field("bar", "name", "stadia of instruments.toml; blank: the only one there"),
+    Field("setup", "name", "set-up of setups.csv from which the bar was read", required=True),
+    Field("to", "name", "station under the middle of the bar", required=True),
+    Field("bar", "name", "stadia of instruments.toml; blank: the only stadia there"),
     *angle_fields("angle", "horizontal angle between the ends of the bar", (LEAST, 0.25)),
     Field(
         "s_arcsec",
         "number",
-        "standard deviation of that angle, seconds of arc",
+        "standard deviation of the angle, seconds of arc",
         required=True,
         low=0,
         high=1e4,
@@ -21,8 +21,8 @@ STADIA = (
     USE,
 )
 COLUMNS = {"stadia": STADIA}
-KIND = "stadia"  # of an instrument
-BAR = (  # keys of instruments.toml
+KIND = "stadia"  # kind of instrument
+BAR = (  # keys of instruments.toml for stadia
     Field(
         "length_m",
         "number",
@@ -33,12 +33,12 @@ BAR = (  # keys of instruments.toml
     Field(
         "u_mm",
         "number",
-        "standard uncertainty of that distance, millimetres",
+        "standard uncertainty of length_m, millimetres",
         low=0,
         high=100,
     ),
 )
-BESIDE = (  # of a triangulation
+BESIDE = (  # tables of a triangulation beside stadia
     *("setups", "directions", "zenith_angles", "targets", "control", "check"),
     *("distances", "height_differences", "correlated_readings"),
 )

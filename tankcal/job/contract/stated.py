@@ -1,4 +1,4 @@
-"""stated.csv: its columns; dips within the tank, the upper one first, volumes that it can hold."""
+"""Columns of stated.csv, and checks of its dips and volumes."""
 
 from tankcal.job.checking import UNIT_FACTOR
 from tankcal.job.contract.shorthand import number, positive
@@ -8,27 +8,25 @@ from tankcal.messages import message
 COLUMNS = (
     positive(
         "high_m",
-        "dip from the table's zero, metres: its volume is reported with uncertainty and budget",
+        "dip from the table's zero, metres; the report states its volume, uncertainty and budget",
         100,
         required=True,
     ),
-    number(
-        "low_m", "of a delivery: the dip it ends at, metres; blank: the volume below high_m", 0, 100
-    ),
+    number("low_m", "for a delivery: dip at its end, metres; blank: volume below high_m", 0, 100),
     positive(
         "volume_m3",
-        "volume that an earlier table or a contract states there, cubic metres, for a decision"
-        " rule that limits deviations",
+        "volume stated by an earlier table or a contract, cubic metres; for decision rules that"
+        " limit deviations",
         1e6,
     ),
-    Field("note", "text", "what it is"),
+    Field("note", "text", "description of the volume"),
 )
 
-_ROUNDING_M = 1e-9
+_ROUNDING_M = 1e-9  # tolerance of comparisons
 
 
 def check_stated(table, extent, log):
-    """Dips within the tank, high above low, each pair once; volumes in cubic metres."""
+    """Check that dips lie within the tank, pairs are unique, and volumes are in cubic metres."""
     first_row = {}
     columns = (table.of(name) for name in ("high_m", "low_m", "volume_m3"))
     for row, high, low, volume in zip(table.rows, *columns, strict=True):
@@ -56,6 +54,7 @@ def check_stated(table, extent, log):
 
 
 def _check_within(table, row, high, low, extent, log):
+    """Check that the dips do not exceed the top of the tank."""
     top = extent.height_m if extent.top_m is None else extent.top_m
     for column, dip in (("high_m", high), ("low_m", low)):
         if None not in (dip, top) and dip > top + _ROUNDING_M:
@@ -69,7 +68,7 @@ def _check_within(table, row, high, low, extent, log):
 
 
 def _check_volume(table, row, high, low, volume, extent, log):
-    """Far more than the whole tank holds, or the slice of a delivery, is another unit."""
+    """Refuse volumes far larger than the tank or the delivery, which are in another unit."""
     height = extent.height_m if low is None else high - low
     if None in (height, extent.area_m2):
         return

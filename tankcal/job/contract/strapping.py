@@ -1,11 +1,11 @@
-"""The tables and keys of strapping: circumferences by tape, what is in its way, gauges, tapes."""
+"""Tables and keys of strapping: circumferences, obstructions, plate thicknesses and tapes."""
 
 from tankcal.job.contract.kinds import LYING, STRAPPED, VERTICAL
 from tankcal.job.contract.observations import USE
 from tankcal.job.fields import Field
 from tankcal.survey.strapping import KINDS
 
-NEEDED = {  # of an obstruction, by its kind
+NEEDED = {  # columns required for each kind of obstruction
     "butt_strap": ("thickness_mm", "width_mm"),
     "weld": ("thickness_mm", "width_mm"),
     "step": ("thickness_mm",),
@@ -17,34 +17,36 @@ NEEDED = {  # of an obstruction, by its kind
 
 
 def _name(name, note, required=False, kinds=()):
+    """Return a column for a name."""
     return Field(name, "name", note, required=required, kinds=kinds)
 
 
 def _number(name, note, low, high, required=False, above_low=False, kinds=()):
+    """Return a column for a number from `low` to `high`."""
     bounds = {"low": low, "high": high, "above_low": above_low}
     return Field(name, "number", note, required=required, kinds=kinds, **bounds)
 
 
 def readings_by_tape(reading_note):
-    """Columns of what was read on a tape, and how, of any circumference."""
+    """Return the columns of a tape reading of a circumference, and of its conditions."""
     return (
         _number("reading_m", reading_note, 0.3, 1000, required=True),
         _number(
             "s_mm", "standard deviation of one reading, millimetres", 0, 100, required=True,
             above_low=True,
         ),
-        _name("instrument", "tape of instruments.toml; blank: the only one there that is read"),
+        _name("instrument", "tape of instruments.toml; blank: the only tape there except"
+                            " masters"),
         _number(
             "temperature_c",
-            "temperature of the tape, degrees Celsius; blank: it lies on the shell and has its"
-            " temperature",
+            "temperature of the tape, degrees Celsius; blank: equal to the shell temperature",
             -60,
             120,
         ),
         _number(
             "tension_n",
-            "pull at the ends of the tape, newtons; of a tape without friction the mean round the"
-            " tank; blank: that of the certificate",
+            "pull at the ends of the tape, newtons; for a tape without friction the mean round"
+            " the tank; blank: tension of the certificate",
             0,
             1000,
             above_low=True,
@@ -53,9 +55,12 @@ def readings_by_tape(reading_note):
 
 
 _COURSE = _name("course", "course of courses.csv", required=True, kinds=VERTICAL)
-_RING = _name("ring", "lying tank, in place of course: ring of rings.csv", True, LYING)
+_RING = _name("ring", "horizontal tank, in place of course: ring of rings.csv", True, LYING)
 CIRCUMFERENCES = (
-    _name("circumference", "its name; rows of the same name are repeated readings", required=True),
+    _name(
+        "circumference", "name of the circumference; rows with an equal name are repeated readings",
+        required=True,
+    ),
     _COURSE,
     _RING,
     _number(
@@ -63,65 +68,73 @@ CIRCUMFERENCES = (
         kinds=VERTICAL,
     ),
     _number(
-        "from_a_m", "lying tank, in place of level_m: place of the tape along the axis from the"
-        " start of the cylinder at A, metres", 0, 200, required=True, kinds=LYING,
+        "from_a_m", "horizontal tank, in place of level_m: position of the tape along the axis"
+        " from the start of the cylinder at A, metres", 0, 200, required=True, kinds=LYING,
     ),
-    *readings_by_tape("reading of the tape round the tank, outside, metres"),
-    _number("pulls", "in how many pieces the tape was pulled round; blank: 1", 1, 50),
+    *readings_by_tape("reading of the tape round the outside of the tank, metres"),
+    _number("pulls", "number of pieces in which the tape was pulled round; blank: 1", 1, 50),
     USE,
-    Field("note", "text", "for the reader"),
+    Field("note", "text", "remark for the reader"),
 )  # fmt: skip
 OBSTRUCTIONS = (
     _name(
         "circumference",
-        "circumference of circumferences.csv, or circle of great_circles.csv, that it is on",
+        "circumference of circumferences.csv, or circle of great_circles.csv, with the obstruction",
         required=True,
     ),
     Field(
         "kind",
         "choice",
         "butt_strap or weld (thickness, width); step (one edge) or lap (thickness); step_over"
-        " (over, arc); measured (excess); sag (span that the tape hangs free over)",
+        " (over, arc); measured (excess); sag (span of the free tape)",
         required=True,
         choices=KINDS,
     ),
-    _number("count", "how many of them; blank: 1", 1, 1000),
-    _number("thickness_mm", "how far it stands out from the plate, millimetres", 0, 200),
-    _number("width_mm", "width along the tape, millimetres", 0, 5000),
-    _number("over_mm", "step-over: length of the tape over it, millimetres", 0, 20000),
+    _number("count", "number of such obstructions; blank: 1", 1, 1000),
+    _number("thickness_mm", "height of the obstruction above the plate, millimetres", 0, 200),
+    _number("width_mm", "width of the obstruction along the tape, millimetres", 0, 5000),
+    _number("over_mm", "step-over: length of the tape over the obstruction, millimetres", 0, 20000),
     _number("arc_mm", "step-over: arc of the bare shell between the legs, millimetres", 0, 20000),
-    _number("excess_mm", "measured: how much longer the tape is for it, millimetres", -50, 500),
+    _number(
+        "excess_mm",
+        "measured: excess of the tape reading due to the obstruction, millimetres",
+        -50,
+        500,
+    ),
     _number(
         "span_m",
-        "sag: length of the free span, its ends level, metres; the tape needs weight_n_per_m",
+        "sag: length of the free span, with level ends, metres; the tape needs weight_n_per_m",
         0,
         100,
         above_low=True,
     ),
-    _number("s_mm", "standard deviation of that, millimetres; blank: 0", 0, 100),
+    _number("s_mm", "standard deviation of the correction, millimetres; blank: 0", 0, 100),
 )
 THICKNESS = (
     _COURSE,
     _RING,
     _number(
-        "thickness_mm", "reading of the gauge, millimetres; their mean replaces that of"
-        " courses.csv", 0, 100, required=True, above_low=True,
+        "thickness_mm", "reading of the thickness gauge, millimetres; the mean replaces the"
+        " thickness in courses.csv", 0, 100, required=True, above_low=True,
     ),
-    _number("s_mm", "standard deviation of the reading, millimetres; blank: as they scatter",
+    _number("s_mm", "standard deviation of the reading, millimetres; blank: from the scatter",
             0, 10),
     _name("instrument", "gauge of instruments.toml"),
-    Field("azimuth_deg", "number", "where it was read, degrees", low=0, high=360),
-    _number("paint_mm", "paint there, millimetres; the mean replaces that of courses.csv", 0, 10),
+    Field("azimuth_deg", "number", "azimuth of the reading, degrees", low=0, high=360),
+    _number(
+        "paint_mm", "thickness of the paint there, millimetres; the mean replaces that in"
+        " courses.csv", 0, 10,
+    ),
 )  # fmt: skip
 TAPE_CHECKS = (
-    _name("level", "where both tapes were read", required=True),
+    _name("level", "place where both tapes were read", required=True),
     _number("master_m", "reading of the master tape, metres", 0.3, 1000, required=True),
     _number("working_m", "reading of the working tape, metres", 0.3, 1000, required=True),
-    _number("s_mm", "standard deviation of the difference, millimetres; blank: as they scatter",
+    _number("s_mm", "standard deviation of the difference, millimetres; blank: from the scatter",
             0, 100),
-    Field("when", "choice", "before or after the work", choices=("before", "after")),
+    Field("when", "choice", "comparison before or after the work", choices=("before", "after")),
 )  # fmt: skip
-IN_PLACE = {"course": "ring", "level_m": "from_a_m"}  # columns of lying tanks
+IN_PLACE = {"course": "ring", "level_m": "from_a_m"}  # columns of horizontal tanks
 COLUMNS = {
     "circumferences": CIRCUMFERENCES,
     "obstructions": OBSTRUCTIONS,
@@ -133,8 +146,9 @@ KEYS = {
         Field(
             "shape_sd_mm",
             "number",
-            "standard deviation of the radius round the wall, millimetres: how far from a circle a"
-            " strapped shell is; blank: 6.1, as shells typically have (needed for a lying tank)",
+            "standard deviation of the radius along the circumference (out-of-roundness of a"
+            " strapped shell), millimetres; blank: 6.1, typical of shells (needed for a"
+            " horizontal tank)",
             kinds=STRAPPED,
             low=0,
             high=300,
@@ -144,7 +158,7 @@ KEYS = {
         Field(
             "wave_mm",
             "number",
-            "how far the tape was at most above or below its level, millimetres; blank: not in U",
+            "largest height of the tape above or below its level, millimetres; blank: not in U",
             kinds=STRAPPED,
             low=0,
             high=1000,
@@ -152,30 +166,41 @@ KEYS = {
         Field(
             "helix_mm",
             "number",
-            "how far its ends stood apart in height at most, millimetres; blank: not in U",
+            "largest difference in height of the tape's ends, millimetres; blank: not in U",
             kinds=STRAPPED,
             low=0,
             high=1000,
         ),
     ),
 }
-TAPE = (  # keys of instruments.toml
-    _number("thickness_mm", "thickness of a tape that straps a tank, millimetres", 0, 5),
-    _number("section_mm2", "section of a tape, mm²; with e_gpa it stretches", 0.1, 100),
+TAPE = (  # keys of instruments.toml for tapes
+    _number("thickness_mm", "thickness of a tape for strapping, millimetres", 0, 5),
+    _number(
+        "section_mm2",
+        "cross-section of a tape, mm²; with e_gpa it determines the stretch",
+        0.1,
+        100,
+    ),
     _number("e_gpa", "Young's modulus of a tape, GPa", 1, 500),
     _number(
         "friction",
-        "coefficient between tape and shell; blank: a tension is the mean round the tank",
+        "coefficient of friction between tape and shell; blank: a tension is the mean round the"
+        " tank",
         0,
         1,
     ),
-    _number("laying_mm", "standard deviation of how each pull lies, millimetres", 0, 50),
+    _number(
+        "laying_mm",
+        "standard deviation of the reading from the lay of the tape in each pull, millimetres",
+        0,
+        50,
+    ),
     _number(
         "weight_n_per_m",
-        "weight of a metre of a tape, newtons; needed where it hangs free (sag in"
+        "weight of a metre of a tape, newtons; needed if the tape hangs free (sag in"
         " obstructions.csv)",
         0.01,
         5,
     ),
-    _name("master", "tape that this one was compared with in tape_checks.csv"),
+    _name("master", "master tape compared with this tape in tape_checks.csv"),
 )

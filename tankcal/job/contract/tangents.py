@@ -1,20 +1,20 @@
-"""The table of tangents: sights to the limbs of a tank from set-ups of a traverse round it."""
+"""Table of tangents: sights to the limbs of a tank from set-ups of a traverse round it."""
 
 from tankcal.job.contract.observations import USE, angle_fields
 from tankcal.job.fields import Field
 
 TANGENTS = (
-    Field("setup", "name", "the set-up, as in setups.csv", required=True),
+    Field("setup", "name", "set-up of setups.csv", required=True),
     Field(
         "set",
         "name",
-        "set of directions within the set-up, with the zero that it has in directions.csv",
+        "set of directions within the set-up, with its zero as in directions.csv",
     ),
     Field("course", "name", "course of courses.csv", required=True),
     Field(
         "level_m",
         "number",
-        "height above the table's zero at which the wall is touched, metres",
+        "height above the table's zero of the point of tangency, metres",
         required=True,
         low=-100,
         high=100,
@@ -22,16 +22,20 @@ TANGENTS = (
     Field(
         "side",
         "choice",
-        "the limb as seen from the set-up",
+        "limb of the tank, as seen from the set-up",
         required=True,
         choices=("left", "right"),
     ),
-    *angle_fields("direction", "as read, clockwise", (-1, 1)),
-    *angle_fields("zenith", "from the zenith down; blank: the sight is at its level", (0, 0.5)),
+    *angle_fields("direction", "direction as read, clockwise", (-1, 1)),
+    *angle_fields(
+        "zenith",
+        "zenith angle, from the zenith downwards; blank: the sight is at its level",
+        (0, 0.5),
+    ),
     Field(
         "s_arcsec",
         "number",
-        "standard deviation of either angle, pointing at the limb included, seconds of arc",
+        "standard deviation of each angle, pointing at the limb included, seconds of arc",
         required=True,
         low=0,
         high=1e4,
@@ -39,7 +43,7 @@ TANGENTS = (
     ),
     USE,
 )
-BESIDE = (  # the traverse that ties the set-ups, and a tape that is joined
+BESIDE = (  # tables of the traverse and of circumferences by tape
     *("setups", "control", "directions", "zenith_angles", "slope_distances"),
     *("stadia", "circumferences", "obstructions"),
 )

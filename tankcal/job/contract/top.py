@@ -1,4 +1,4 @@
-"""[top]: the keys of a head on an upright tank; its form complete, and of a credible size."""
+"""Keys of [top], the head of a vertical tank, and checks of its form and sizes."""
 
 from tankcal.job.checking import is_not_given, missing_beside, tell
 from tankcal.job.contract.bottom import DEEPEST, SHAPED
@@ -16,14 +16,14 @@ from tankcal.messages import message
 KEYS = (
     choice(
         "form",
-        "head on top of the shell, which liquid may rise into: cone, dish, ellipsoidal or"
-        " torispherical; blank: the table ends with the shell",
+        "head on top of the shell, which the liquid may enter: cone, dish, ellipsoidal or"
+        " torispherical; blank: the table ends at the top of the shell",
         SHAPED,
         kinds=VERTICAL,
     ),
     positive(
         "depth_m",
-        "rise of its middle over the top of the last course, inside, metres",
+        "inside height of the head above the top of the last course, metres",
         100,
         kinds=VERTICAL,
     ),
@@ -32,7 +32,7 @@ KEYS = (
 
 
 def depth_of_top(values):
-    """Rise of the head over the shell, m; 0 without one, None: that is not known."""
+    """Return the height of the head above the shell, m; 0 without a head, None if unknown."""
     given, diameter = values["top"], values["tank"]["nominal_diameter_m"]
     if given["form"] is None or values["corrections"]["top"] is False:
         return 0.0
@@ -40,22 +40,22 @@ def depth_of_top(values):
 
 
 def check_top(values, is_metered, raw, log):
-    """The form with its sizes, nothing without it, and sizes that go with the diameter."""
+    """Check that a head has a form and sizes, and sizes that fit the diameter."""
     given, form, depth = values["top"], values["top"]["form"], values["top"]["depth_m"]
     diameter = values["tank"]["nominal_diameter_m"]
     names = [field.name for field in KEYS]
     if is_not_given(raw, "top", "form"):
-        there = [name for name in names if not is_not_given(raw, "top", name)]
-        if there:
-            tell(log.problem, raw, "top", "form", missing_beside(there[0]))
+        present = [name for name in names if not is_not_given(raw, "top", name)]
+        if present:
+            tell(log.problem, raw, "top", "form", missing_beside(present[0]))
         return
     if form is None:
         return
     if is_metered:
         expected = message(
             "top_beside_liquid",
-            "given together with liquid.csv; expected a blank: metered runs tell the shell, and its"
-            " table ends with it",
+            "given together with liquid.csv; expected a blank: metered runs calibrate only the"
+            " shell, and the table ends at its top",
         )
         tell(log.problem, raw, "top", "form", expected)
     if form != "torispherical" and is_not_given(raw, "top", "depth_m"):

@@ -1,4 +1,4 @@
-"""uncertainty.csv: what it may declare, what is assumed without it, its columns and its checks."""
+"""Inputs of uncertainty.csv, values assumed for undeclared inputs, columns and checks."""
 
 from dataclasses import dataclass
 from math import degrees, pi
@@ -10,22 +10,32 @@ from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.fields import Field
 from tankcal.messages import message
 
-AS_READ = ("standard", "half_width", "expanded", "scale", "sd")  # what u may be
+AS_READ = ("standard", "half_width", "expanded", "scale", "sd")  # meanings of u
 
 
 @dataclass(frozen=True)
 class Declarable:
-    """One input that may be declared.
+    """Input whose uncertainty may be declared.
 
-    unit     as it must be written
-    per_si   how many of it make one of SI
-    largest  standard uncertainty that makes sense, in that unit
-    note     what it is
-    kinds    the kinds of tank that it bears on
-    default  half-width of the rectangular distribution that is assumed where it bears on a job and
-             is not declared, in that unit; None: nothing is assumed
-    default_share  the same as a part of the input's own value, in place of `default`
-    correlates     whether it may be correlated with others: it is one error, not many
+    Attributes
+    ----------
+    unit : str
+        Unit, as written in uncertainty.csv.
+    per_si : float
+        Number of these units in the SI unit.
+    largest : float
+        Largest plausible standard uncertainty, in `unit`.
+    note : str
+        Description of the input.
+    kinds : tuple of str
+        Kinds of tank that the input affects.
+    default : float or None
+        Half-width, in `unit`, of the rectangular distribution assumed if the input affects a job
+        and is not declared; None: no uncertainty is assumed.
+    default_share : float or None
+        Half-width as a fraction of the value of the input, in place of `default`.
+    correlates : bool
+        Whether the input may be correlated with other inputs; False for many independent errors.
     """
 
     unit: str
@@ -38,27 +48,27 @@ class Declarable:
     correlates: bool = True
 
     def assumed_half_width(self, value):
-        """Half-width of the default in `unit`, None without one; value: of the input, or None."""
+        """Return the half-width of the default in `unit`, or None; value: value of the input."""
         return self.default if self.default_share is None else self.default_share * value
 
     @property
     def assumption(self):
-        """The default as it is told: "± 2 K", "± 1 % of its value"; "" without one."""
+        """Default as a text: "± 2 K", "± 1 % of its value"; "" without a default."""
         if self.default_share is not None:
             return f"± {100 * self.default_share:g} % of its value"
         number = f"{self.default or 0:g}".replace("e-0", "e-")
         return "" if self.default is None else f"± {number} {self.unit}"
 
 
-def _of_shell(unit, per_si, largest, note, **more):
+def _vertical_input(unit, per_si, largest, note, **more):
     return Declarable(unit, per_si, largest, note, VERTICAL, **more)
 
 
-def _of_ship(unit, per_si, largest, note, **more):
+def _ship_input(unit, per_si, largest, note, **more):
     return Declarable(unit, per_si, largest, note, ("mesh",), **more)
 
 
-def _of_lying(unit, per_si, largest, note, **more):
+def _horizontal_input(unit, per_si, largest, note, **more):
     return Declarable(unit, per_si, largest, note, ("horizontal",), **more)
 
 
@@ -68,33 +78,33 @@ INPUTS = {
         "mm",
         1e3,
         100,
-        "offset of instrument or target square to the wall, the same for all points",
+        "offset of instrument or target perpendicular to the wall, common to all points",
         WITH_POINTS,
     ),
-    "datum": Declarable("mm", 1e3, 100, "height of the table's zero against the tank"),
-    "course_heights": _of_shell(
+    "datum": Declarable("mm", 1e3, 100, "height of the table's zero relative to the tank"),
+    "course_heights": _vertical_input(
         "mm", 1e3, 100, "height of each course, independent of the others", correlates=False
     ),
     "plate_thickness": Declarable(
-        "mm", 1e3, 10, "plate thickness, the same error everywhere", WITH_POINTS, default=0.2
+        "mm", 1e3, 10, "plate thickness, error common to all plates", WITH_POINTS, default=0.2
     ),
     "paint": Declarable(
-        "mm", 1e3, 5, "paint thickness, the same error in all courses", STRAPPED, default=0.05
+        "mm", 1e3, 5, "paint thickness, error common to all courses", STRAPPED, default=0.05
     ),
     "shell_temperature": Declarable("K", 1, 50, "shell temperature during the survey", default=2.0),
     "expansion": Declarable("1/K", 1, 1e-4, "coefficient of thermal expansion", default=1e-6),
     "youngs_modulus": Declarable(
         "GPa", 1e-9, 100, "Young's modulus of the shell", LOADED, default=6.0
     ),
-    "liquid_density": Declarable(
-        "kg/m3", 1, 500, "density of the liquid that the table is for", LOADED
-    ),
+    "liquid_density": Declarable("kg/m3", 1, 500, "density of the liquid for the table", LOADED),
     "survey_level": Declarable(
         "mm", 1e3, 1000, "level of the liquid on the survey day", LOADED, default=5.0
     ),
-    "survey_density": Declarable("kg/m3", 1, 500, "density of that liquid", LOADED, default=5.0),
+    "survey_density": Declarable(
+        "kg/m3", 1, 500, "density of the liquid on the survey day", LOADED, default=5.0
+    ),
     "pressure": Declarable(
-        "bar", 1e-5, 10, "gauge pressure in the sphere that the table is for", ("sphere",)
+        "bar", 1e-5, 10, "gauge pressure in the sphere for the table", ("sphere",)
     ),
     "survey_pressure": Declarable(
         "bar",
@@ -104,104 +114,109 @@ INPUTS = {
         ("sphere",),
         default=0.1,
     ),
-    "bottom": _of_shell(
-        "mm", 1e3, 500, "height of the bottom's surface, the same error everywhere"
+    "bottom": _vertical_input(
+        "mm", 1e3, 500, "height of the bottom surface, error common to all of it"
     ),
-    "barrel": _of_shell("mm", 1e3, 100, "how far a course bulges between its sections"),
-    "taper": _of_shell(
-        "mm", 1e3, 100, "how far one end of a course is wider than its middle, the same in all"
+    "barrel": _vertical_input("mm", 1e3, 100, "bulge of a course between its sections"),
+    "taper": _vertical_input(
+        "mm",
+        1e3,
+        100,
+        "excess of the radius at one end of a course over its middle, common to all courses",
     ),
-    "roof_mass": _of_shell("kg", 1, 1e6, "mass of the floating roof", default_share=0.01),
+    "roof_mass": _vertical_input("kg", 1, 1e6, "mass of the floating roof", default_share=0.01),
     "deadwood": Declarable(
         "%",
         100,
         50,
-        "volume of the deadwood without u_m3 of its own, the same relative error",
+        "volume of the deadwood without u_m3, common relative error",
         default=5.0,
     ),
     "diameter": Declarable(
         "mm", 1e3, 200, "diameter of the cylinder or sphere", ("horizontal", "sphere")
     ),
-    "length": _of_lying("mm", 1e3, 500, "length of the horizontal cylinder"),
-    "end_depth": _of_lying("mm", 1e3, 500, "depth of both ends, the same error"),
+    "length": _horizontal_input("mm", 1e3, 500, "length of the horizontal cylinder"),
+    "end_depth": _horizontal_input("mm", 1e3, 500, "depth of both ends, common error"),
     "dish": Declarable(
         "mm",
         1e3,
         500,
-        "radius of the dish of torispherical ends and heads, where it is given, the same error",
+        "radius of the dish of torispherical ends and heads, where given, common error",
         ("vertical", "horizontal"),
     ),
     "knuckle": Declarable(
         "mm",
         1e3,
         200,
-        "radius of the knuckle of torispherical ends and heads, where it is given, the same error",
+        "radius of the knuckle of torispherical ends and heads, where given, common error",
         ("vertical", "horizontal"),
     ),
-    "bottom_depth": _of_shell(
-        "mm", 1e3, 500, "depth of a shaped bottom from its edge to its middle"
+    "bottom_depth": _vertical_input(
+        "mm", 1e3, 500, "depth of a shaped bottom from its edge to its centre"
     ),
-    "top_depth": _of_shell("mm", 1e3, 500, "rise of the head on top over the shell"),
+    "top_depth": _vertical_input("mm", 1e3, 500, "height of the head above the shell"),
     "tilt": Declarable(
         "mm/m",
         1e3,
         50,
-        "tilt of the axis; of a vertical tank such as settlement since the survey",
+        "tilt of the axis; for a vertical tank such as settlement since the survey",
         ("vertical", "horizontal"),
     ),
-    "dip_position": _of_lying("mm", 1e3, 2000, "place of the dip point along the axis"),
-    "ring_lengths": _of_lying(
+    "dip_position": _horizontal_input("mm", 1e3, 2000, "position of the dip point along the axis"),
+    "ring_lengths": _horizontal_input(
         "mm", 1e3, 100, "length of each ring, independent of the others", correlates=False
     ),
-    "ring_axes": _of_lying(
+    "ring_axes": _horizontal_input(
         "mm",
         1e3,
         50,
-        "how far the axis of each ring stands above the common one, independent of the others",
+        "height of the axis of each ring above the common axis, independent of the others",
         correlates=False,
     ),
-    "tube_angle": _of_lying("deg", 180 / pi, 10, "angle of the gauge tube off the plumb"),
-    "tube_offset": _of_lying("mm", 1e3, 500, "place of the gauge tube across the axis"),
+    "tube_angle": _horizontal_input(
+        "deg", 180 / pi, 10, "angle of the gauge tube from the vertical"
+    ),
+    "tube_offset": _horizontal_input("mm", 1e3, 500, "position of the gauge tube across the axis"),
     "surface": Declarable("mm", 1e3, 200, "offset of the mesh's surface from the wall", ("mesh",)),
-    "trim": _of_ship("mm", 1e3, 1000, "trim of a ship: draught aft less draught forward"),
-    "list": _of_ship("deg", degrees(1), 5, "list of a ship"),
-    "pipe_x": _of_ship("mm", 1e3, 1000, "place of the sounding pipe fore and aft"),
-    "pipe_y": _of_ship("mm", 1e3, 1000, "place of the sounding pipe athwart"),
-    "pipe_lean": _of_ship(
+    "trim": _ship_input("mm", 1e3, 1000, "trim of a ship: draught aft minus draught forward"),
+    "list": _ship_input("deg", degrees(1), 5, "list of a ship"),
+    "pipe_x": _ship_input("mm", 1e3, 1000, "position of the sounding pipe fore and aft"),
+    "pipe_y": _ship_input("mm", 1e3, 1000, "position of the sounding pipe athwart"),
+    "pipe_lean": _ship_input(
         "mm/m", 1e3, 50, "lean of the sounding pipe, fore and aft and athwart", correlates=False
     ),
-    "contraction": _of_ship("%", 100, 0.5, "uniform contraction of all lengths"),
+    "contraction": _ship_input("%", 100, 0.5, "uniform contraction of all lengths"),
     "interpolation": Declarable(
-        "m3", 1, 100, "straight line between two rows, of each reading", correlates=False
+        "m3", 1, 100, "linear interpolation between two rows, for each reading", correlates=False
     ),
     "rounding": Declarable(
-        "m3", 1, 10, "last digit of a printed volume, of each reading", correlates=False
+        "m3", 1, 10, "last digit of a printed volume, for each reading", correlates=False
     ),
 }
-UNITS = tuple(dict.fromkeys(one.unit for one in INPUTS.values()))
+UNITS = tuple(dict.fromkeys(declarable.unit for declarable in INPUTS.values()))
 
 COLUMNS = (
-    choice("input", "what is uncertain: " + ", ".join(INPUTS), tuple(INPUTS), required=True),
+    choice("input", "uncertain input: " + ", ".join(INPUTS), tuple(INPUTS), required=True),
     number(
-        "u", "how uncertain it is: its standard uncertainty, or what u_is says", 0, required=True
+        "u", "standard uncertainty of the input, or the quantity that u_is states", 0, required=True
     ),
     choice(
         "unit",
-        "; ".join(f"{name}: {one.unit}" for name, one in INPUTS.items()),
+        "; ".join(f"{name}: {declarable.unit}" for name, declarable in INPUTS.items()),
         UNITS,
         required=True,
     ),
     choice(
         "u_is",
-        "what u is: standard; half_width of a bounded distribution; expanded, with its k; scale or"
-        " sd of a t distribution; blank: standard",
+        "meaning of u: standard; half_width of a bounded distribution; expanded, with its k;"
+        " scale or sd of a t distribution; blank: standard",
         AS_READ,
     ),
     number("k", "coverage factor of an expanded uncertainty", 1, 20),
     choice("type", "A (statistics) or B; blank: B", ("A", "B")),
-    choice("distribution", "blank: normal", ("normal", *FAMILIES, "t")),
+    choice("distribution", "distribution of the input; blank: normal", ("normal", *FAMILIES, "t")),
     number("dof", "degrees of freedom, 1 or more; blank: infinite", 1),
-    Field("note", "text", "where the figure comes from"),
+    Field("note", "text", "source of the value"),
 )
 
 OF_T = ("scale", "sd")
@@ -210,8 +225,18 @@ SPREAD_COLUMNS = ("u", "u_is", "k", "distribution", "dof")
 
 
 def check_inputs(inputs, useless, log):
-    """Each input once, in its own unit, of a credible size, and not in `useless` {name: why}."""
-    told = {problem.row for problem in log.problems if problem.file == inputs.file}
+    """Check that each input is declared once, in its unit, of plausible size, and has an effect.
+
+    Parameters
+    ----------
+    inputs : ColumnValues
+        Rows of uncertainty.csv.
+    useless : dict
+        Reason by name of the inputs without effect on the job.
+    log
+        Log of the problems.
+    """
+    reported_rows = {problem.row for problem in log.problems if problem.file == inputs.file}
     refuse_repeated(inputs, "input", log)
     units = inputs.of("unit")
     rows = zip(inputs.rows, inputs.of("input"), units, spreads(inputs), strict=True)
@@ -231,17 +256,20 @@ def check_inputs(inputs, useless, log):
                 name=name,
             )
             log.problem(inputs.file, expected, row, "unit")
-        if row not in told and spread[0] is not None:
+        if row not in reported_rows and spread[0] is not None:
             _check_spread(inputs.file, row, name, unit, spread, log)
 
 
 def spreads(inputs):
-    """(u, u_is, k, distribution, dof) of each row of uncertainty.csv, None where blank."""
+    """Return (u, u_is, k, distribution, dof) of each row of uncertainty.csv, None for a blank."""
     return [*zip(*(inputs.of(column) for column in SPREAD_COLUMNS), strict=True)]
 
 
 def standard_u(u, u_is, k, distribution, dof):
-    """Standard uncertainty of a sound row, in its unit; of a t distribution what u_is says."""
+    """Return the standard uncertainty of a valid row, in its unit.
+
+    For a t distribution, u is returned, scale or standard deviation as stated by `u_is`.
+    """
     if u_is == "half_width":
         return within(u, distribution).u
     if u_is == "expanded":
@@ -250,8 +278,8 @@ def standard_u(u, u_is, k, distribution, dof):
 
 
 def _check_spread(file, row, name, unit, spread, log):
-    """Cells of a row without other problems: do they agree, and is u of a credible size?"""
-    contradictions = _contradictions(*spread[1:])
+    """Check that the cells of a row agree, and the standard uncertainty is of plausible size."""
+    contradictions = _find_contradictions(*spread[1:])
     for column, expected in contradictions:
         log.problem(file, expected, row, column)
     known = INPUTS[name]
@@ -281,12 +309,12 @@ def _check_spread(file, row, name, unit, spread, log):
         log.problem(file, expected, row, "u")
 
 
-def _contradictions(u_is, k, distribution, dof):
-    """[(column, what is wrong)] of what u is, its coverage factor and its distribution."""
+def _find_contradictions(u_is, k, distribution, dof):
+    """Return [(column, message)] for contradictions of u_is, coverage factor and distribution."""
     name = distribution or NORMAL
-    found = [*_of_t(u_is, dof)] if name == "t" else [*_of_others(u_is, name)]
+    problems = [*_check_t(u_is, dof)] if name == "t" else [*_check_other(u_is, name)]
     if u_is == "expanded" and k is None:
-        found.append(
+        problems.append(
             (
                 "k",
                 message(
@@ -296,7 +324,7 @@ def _contradictions(u_is, k, distribution, dof):
             )
         )
     if u_is != "expanded" and k is not None:
-        found.append(
+        problems.append(
             (
                 "k",
                 message(
@@ -306,24 +334,23 @@ def _contradictions(u_is, k, distribution, dof):
                 ),
             )
         )
-    return found
+    return problems
 
 
-def _of_t(u_is, dof):
+def _check_t(u_is, dof):
+    """Yield (column, message) for each problem of a t distribution."""
     if u_is not in OF_T:
         if u_is is None:
             yield (
                 "u_is",
-                message(
-                    "t_blank", "blank; expected scale or sd: of a t distribution u may be either"
-                ),
+                message("t_blank", "blank; expected scale or sd for a t distribution"),
             )
         else:
             yield (
                 "u_is",
                 message(
                     "t_other",
-                    "found {u_is}; expected scale or sd: of a t distribution u may be either",
+                    "found {u_is}; expected scale or sd for a t distribution",
                     u_is=u_is,
                 ),
             )
@@ -343,13 +370,14 @@ def _of_t(u_is, dof):
         )
 
 
-def _of_others(u_is, name):
+def _check_other(u_is, name):
+    """Yield (column, message) for each problem of another distribution."""
     if u_is in OF_T:
         yield (
             "u_is",
             message(
                 "only_beside_t",
-                "found {u_is}; expected it only with distribution = t; this one is {name}",
+                "found {u_is}; expected only with distribution = t; the distribution is {name}",
                 u_is=u_is,
                 name=name,
             ),

@@ -1,4 +1,4 @@
-"""welds.csv: its columns; courses that are there, and each of their welds once."""
+"""Columns of welds.csv, and checks of its courses and azimuths."""
 
 from itertools import combinations
 
@@ -7,7 +7,7 @@ from tankcal.job.fields import Field
 from tankcal.messages import message
 
 COLUMNS = (
-    Field("course", "name", "course of courses.csv that the weld is in", required=True),
+    Field("course", "name", "course of courses.csv with the weld", required=True),
     number(
         "azimuth_deg",
         "azimuth of the vertical weld about the axis, clockwise from +y of the points, degrees",
@@ -17,13 +17,20 @@ COLUMNS = (
     ),
 )
 
-APART_DEG = 0.1  # two welds that are nearer are one, given twice
+APART_DEG = 0.1  # welds closer than this are considered as repeated
 
 
 def check_welds(table, courses, log):
-    """Courses of courses.csv; no weld of a course twice.
+    """Check that each weld is in a course of courses.csv and is given once.
 
-    courses  courses.csv, or None: not there or unreadable
+    Parameters
+    ----------
+    table : ColumnValues
+        Rows of welds.csv.
+    courses : ColumnValues or None
+        Rows of courses.csv; None if missing or unreadable.
+    log
+        Log of the problems.
     """
     known = None if courses is None or courses.skipped else set(courses.of("course"))
     places = {}
@@ -41,13 +48,13 @@ def check_welds(table, courses, log):
         elif None not in (course, azimuth):
             places.setdefault(course, []).append((azimuth, row))
     for welds in places.values():
-        for (one, first_row), (other, row) in combinations(welds, 2):
-            if abs((one - other + 180) % 360 - 180) < APART_DEG:
+        for (first, first_row), (second, row) in combinations(welds, 2):
+            if abs((first - second + 180) % 360 - 180) < APART_DEG:
                 expected = message(
                     "weld_twice",
                     "a weld of this course at {azimuth_deg:g} degrees is already in row "
                     "{first_row}; expected once",
-                    azimuth_deg=one,
+                    azimuth_deg=first,
                     first_row=first_row,
                 )
                 log.problem(table.file, expected, row, "azimuth_deg")
