@@ -33,37 +33,37 @@ from tankcal.errors import Problem, TankcalError, reason_of
 from tankcal.messages import message, printable_lines
 
 DESCRIPTION = """\
-tankcal calibrates storage tanks: from surveyed points of the wall to the capacity
-table, with its uncertainty, as Excel workbook, PDF certificate and notebook."""
+tankcal calibrates storage tanks: from a survey of the wall to the capacity table with
+its uncertainty, as Excel workbook, PDF certificate and notebook."""
 
 EPILOG = """\
 a new tank, step by step:
-  tankcal new my-tank           write an empty job: the folder my-tank with job.toml, points.csv,
+  tankcal new my-tank           create an empty job: the folder my-tank with job.toml, points.csv,
                                 courses.csv
-  tankcal new my-tank --workbook   or, for those who prefer Excel, with one workbook, job.xlsx
-  (fill in the blanks, in the CSV files or in the workbook)
-  tankcal run my-tank           compute it; the results are in my-tank/results
-  tankcal notebook my-tank      fill it in, check and compute it in a notebook (JupyterLab)
-  tankcal app my-tank           the same as a page without code
-  tankcal report my-tank/results --language es   the papers again, in Spanish
-  tankcal lint table.csv        look for mistakes in any capacity table
-  tankcal read-table old.csv --courses courses.csv   radii and head out of a former table
+  tankcal new my-tank --workbook   or with one Excel workbook, job.xlsx
+  (enter the measurements in the CSV files or in the workbook)
+  tankcal run my-tank           compute the job; the results are in my-tank/results
+  tankcal notebook my-tank      edit, check and compute the job in a notebook (JupyterLab)
+  tankcal app my-tank           the same in a web page without code
+  tankcal report my-tank/results --language es   write the reports again, in Spanish
+  tankcal lint table.csv        check any capacity table for errors
+  tankcal read-table old.csv --courses courses.csv   radii and head from a former table
   tankcal compare old.csv my-tank/results        has the tank changed since its former table?
   tankcal history archive --tank TK-1            its tables, radii and verdicts over the years
-  tankcal verify my-tank/results                 do the files of a run belong together?
-  tankcal export my-tank/results --profile NAME   the table as a gauging system takes it
-  tankcal inspect my-tank                      plumb, roundness and settlement by the same survey
-  tankcal batch site --out site-results        the same with many jobs, on all cores
+  tankcal verify my-tank/results                 do the files of a run agree?
+  tankcal export my-tank/results --profile NAME   the table for a gauging system
+  tankcal inspect my-tank                      plumb, roundness and settlement from the same survey
+  tankcal batch site --out site-results        compute many jobs, on all cores
 
 photographs, distances, angles and levels instead of surveyed points:
-  tankcal new my-tank --survey photos          (or total-station) write such a job
-  tankcal run my-tank --only adjustment        adjust the survey; no tank is needed
+  tankcal new my-tank --survey photos          (or total-station) create such a job
+  tankcal run my-tank --only adjustment        adjust the survey; no tank is required
   tankcal import book.gsi --out my-tank        read the field book of a total station
-  tankcal plan my-plan                         what a survey will be worth, before it is made
+  tankcal plan my-plan                         predict the uncertainty of a survey
 
-exit status: 0 done; 2 the input must be mended (one line per problem: file, row, column, what was
-expected; earlier results stay as they were); 3 the survey has no sound solution; 130 stopped by
-Ctrl-C, 143 by SIGTERM, 129 by closing the terminal.
+exit status: 0 done; 2 the input must be corrected (one line per problem: file, row, column,
+expected value; earlier results remain unchanged); 3 the survey has no valid solution; 130 stopped
+by Ctrl-C, 143 by SIGTERM, 129 by closing the terminal.
 
 the job format: docs/job-format.md; axes, signs and units: docs/conventions.md"""
 
@@ -101,14 +101,16 @@ def _status_of(error):
     """
     status = stopped_status(error)
     if status is not None:
-        complain(message("stopped", "stopped; results are as they were, or whole new ones"))
+        complain(
+            message("stopped", "stopped; earlier results are unchanged, or completely replaced")
+        )
         return status
     if is_of_memory(error):
         complain(
             message(
                 "out_of_memory",
-                "not enough memory; earlier results are as they were. Close other programs, raise "
-                "the limit of memory, or compute on a larger machine",
+                "not enough memory; earlier results are unchanged. Close other programs, raise "
+                "the memory limit, or compute on a machine with more memory",
             )
         )
         return 2

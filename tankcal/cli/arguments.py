@@ -17,8 +17,8 @@ def add_language(parser):
         "--language",
         metavar="CODE",
         choices=LANGUAGES,
-        help=f"of what is printed and written: {', '.join(LANGUAGES)} (default: that of the input "
-        "where it asks for one, else that of the environment)",
+        help=f"language of all output: {', '.join(LANGUAGES)} (default: language of the input, "
+        "else of the environment)",
     )
 
 
@@ -99,7 +99,7 @@ def parse_worker_memory(text):
         raise refuse_argument(
             message(
                 "option_worker_memory",
-                "found {text!r}; expected at least {least} gigabytes; jobs with papers need 1",
+                "found {text!r}; expected at least {least} gigabytes; jobs with reports need 1",
                 text=text,
                 least=LEAST_WORKER_GB,
             )

@@ -383,8 +383,8 @@ def _refuse_several(options, count):
     if options.out is not None and count > 1:
         several = message(
             "camera_several_sets",
-            "there are {count} sets of parameters; expected --camera or --photo, to choose "
-            "the one to write",
+            "there are {count} sets of parameters; expected --camera or --photo, to select the "
+            "set to write",
             count=count,
         )
         raise InputError(Problem("--out", several))

@@ -22,31 +22,37 @@ def add(commands):
     compare = commands.add_parser(
         "compare",
         help="compare a former table with a new one of the same tank",
-        description="Bring two capacity tables of a tank to one basis (zero, temperature, head, "
-        "roof, rounding), say what differs in rows, deliveries and radii of the courses, and judge "
-        "it by a rule: keep, recompute or recalibrate. docs/compare.md says how.",
-        epilog="exit status: 0 done, whatever the verdict; 2 the input must be mended.",
+        description="Reduce two capacity tables of a tank to one basis (zero, temperature, head, "
+        "roof, rounding). Report differences of rows, deliveries and course radii, with a verdict "
+        "by a rule: keep, recompute or recalibrate. See docs/compare.md.",
+        epilog="exit status: 0 done, whatever the verdict; 2 the input must be corrected.",
     )
     table = "a CSV file, an Excel workbook (.xlsx), a PDF with a text table, a former.toml, a "
     table += "record.json or a folder of results"
     compare.add_argument("old", metavar="OLD", help=f"the former table: {table}")
-    compare.add_argument("new", metavar="NEW", help="the new table: any of these")
+    compare.add_argument("new", metavar="NEW", help="the new table, in any of these forms")
     compare.add_argument(
-        "--former", metavar="FILE.toml", help="what is known of the former table beside its rows"
+        "--former",
+        metavar="FILE.toml",
+        help="facts about the former table that its rows do not contain",
     )
     compare.add_argument(
-        "--new-former", metavar="FILE.toml", help="the same of the new table, where it is no record"
+        "--new-former", metavar="FILE.toml", help="facts about the new table, if it is not a record"
     )
     compare.add_argument(
-        "--courses", metavar="FILE", help="courses.csv of an upright tank (default: of the record)"
+        "--courses",
+        metavar="FILE",
+        help="courses.csv of a vertical tank (default: courses of the record)",
     )
     compare.add_argument(
         "--rule",
         metavar="RULE",
-        help="a rule by its name, or a .toml file (default: france_2020_recalibration)",
+        help="the name of a rule, or a .toml file (default: france_2020_recalibration)",
     )
     compare.add_argument(
-        "--out", metavar="DIR", help="write comparison.json and papers there, all or nothing"
+        "--out",
+        metavar="DIR",
+        help="write comparison.json and reports to this folder, all or nothing",
     )
     add_language(compare)
     compare.add_argument("--quiet", action="store_true", help="no progress, only problems")
@@ -95,7 +101,7 @@ def _tell(found):
 def _sides(found):
     return message(
         "compare_sides",
-        "{former} against {new}: {rows} rows from {low} to {high} m",
+        "{former} compared with {new}: {rows} rows from {low} to {high} m",
         former=found["former"]["name"],
         new=found["new"]["name"],
         rows=len(found["rows"]["height_m"]),

@@ -27,9 +27,9 @@ def add(commands, make_parser):
     words in the language that is spoken or None)."""
     parser = commands.add_parser(
         "completion",
-        help="write the script by which a shell completes commands",
-        description="Write the script by which a shell completes the commands of tankcal, their "
-        "options, the values of these, files and folders.",
+        help="write the script for command completion in a shell",
+        description="Write the script by which a shell completes the commands of tankcal, options, "
+        "values, files and folders.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -20,37 +20,41 @@ def add(commands):
     parser = commands.add_parser(
         "export",
         help="write a table for a gauging or inventory system",
-        description="Write the capacity table of a record as a gauging or inventory system takes "
-        "it, by a profile: the rows that err least where it takes only few, each rounded once, "
-        "read back by the linter. The report beside the file (NAME-report.txt) says how far off "
-        "what the system reads is at most. docs/exports.md has the profiles.",
-        epilog="exit status: 0 done; 2 the record, the profile or the options must be mended (one "
-        "line per problem; nothing is written then).",
+        description="Write the capacity table of a record in the form of a gauging or inventory "
+        "system, defined by a profile. If the system limits the number of rows, the rows with the "
+        "smallest error are selected. Each value is rounded once, and the linter checks the file. "
+        "The report beside the file (NAME-report.txt) states the largest error of the volumes "
+        "that the system computes. docs/exports.md lists the profiles.",
+        epilog="exit status: 0 done; 2 the record, the profile or the options must be corrected "
+        "(one line per problem; no file is written).",
     )
     parser.add_argument(
         "record", metavar="RECORD", nargs="?", help="a record.json, or a folder of results"
     )
     parser.add_argument(
-        "--profile", metavar="NAME", help="one of --list, or a TOML file of your own"
+        "--profile", metavar="NAME", help="a profile that --list shows, or your TOML file"
     )
-    parser.add_argument("--list", action="store_true", help="show the profiles there are")
+    parser.add_argument("--list", action="store_true", help="list the shipped profiles")
     most = parser.add_mutually_exclusive_group()
     most.add_argument(
-        "--points", metavar="K", type=parse_list, help="rows at most: those that err least"
+        "--points",
+        metavar="K",
+        type=parse_list,
+        help="largest number of rows; the rows with the smallest error are selected",
     )
     most.add_argument(
         "--max-error-l",
         metavar="LITRES",
         type=positive,
-        help="the fewest rows that err by no more, in litres",
+        help="write the fewest rows with at most this error, in litres",
     )
     parser.add_argument(
         "--gauge-on-shell",
         action="store_true",
-        help="the gauge hangs on the shell: work out HyTD, by which its reference is drawn down",
+        help="the gauge is mounted on the shell: compute HyTD, the movement of its reference",
     )
     parser.add_argument(
-        "--out", metavar="FILE", help="where to write (default: TANK-PROFILE.csv here)"
+        "--out", metavar="FILE", help="output file (default: TANK-PROFILE.csv in this folder)"
     )
     add_language(parser)
     add_json(parser)
@@ -95,7 +99,7 @@ def _refuse_missing(options):
     )
     profile = message(
         "export_needs_profile",
-        "missing; expected one of those that tankcal export --list shows, or a .toml file",
+        "missing; expected a profile that tankcal export --list shows, or a .toml file",
     )
     needed = (("RECORD", options.record, record), ("--profile", options.profile, profile))
     missing = [Problem(name, text) for name, given, text in needed if given is None]
@@ -115,9 +119,11 @@ def _out(options, export, source):
             or out.resolve() == source.resolve()
         ):
             text = message(
-                "export_out", "expected the name of a file with an ending such as {ending}, that "
-                "is neither a folder, a record nor a profile", ending=export.profile.ending,
-            )  # fmt: skip
+                "export_out",
+                "expected a file name with an ending such as {ending}, not a folder, a record or a "
+                "profile",
+                ending=export.profile.ending,
+            )
             raise InputError(Problem("--out", text))
         return out
     return Path(default_name(export))
@@ -137,7 +143,7 @@ def _list(options):
     for code, one in profiles.items():
         points = message("export_any_points", "any number of rows")
         if one.max_points:
-            points = message("export_most_points", "{most} rows at most", most=one.max_points)
+            points = message("export_most_points", "at most {most} rows", most=one.max_points)
         known = message("export_unverified", "not verified")
         if one.verified:
             known = message("export_verified", "verified")

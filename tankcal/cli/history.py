@@ -21,42 +21,43 @@ def add(commands):
     """The parser of `tankcal history`."""
     history = commands.add_parser(
         "history",
-        help="the tables of one tank over the years",
-        description="Search folders for the results of a tank (record.json, inspection.json), "
-        "bring its tables to one basis, and show certificates, volumes, radii and verdicts over "
-        "the years, each with U; what changed from one table to the next is what tankcal compare "
-        "says of them. docs/history.md says how.",
-        epilog="exit status: 0 done; 2 the input must be mended (one line for each file that "
-        "cannot be read).",
+        help="show the tables of one tank over the years",
+        description="Search folders for the results of a tank (record.json, inspection.json) and "
+        "reduce its tables to one basis. Show certificates, volumes, radii and verdicts over the "
+        "years, each with U, and the changes between successive tables by the method of tankcal "
+        "compare. See docs/history.md.",
+        epilog="exit status: 0 done; 2 the input must be corrected (one line for each unreadable "
+        "file).",
     )
     history.add_argument(
         "sources",
         metavar="TANK",
         nargs="+",
-        help="folders, in and below which results are looked for; files record.json or "
-        "inspection.json; former tables, by a former.toml with their date",
+        help="folders to search for results, with their subfolders; files record.json or "
+        "inspection.json; former tables, given by a former.toml with their date",
     )
     history.add_argument(
         "--tank",
         metavar="ID",
         action="append",
         default=[],
-        help="id of the tank, in folders of several; several times where it has had several",
+        help="id of the tank, if the folders contain several tanks; repeat the option for a tank "
+        "with several ids",
     )
     history.add_argument(
         "--at",
         metavar="DIPS",
         type=parse_dips,
-        help="dips that volumes are shown at, m, separated by commas (default: fifths of the "
-        "range that all tables have)",
+        help="dips of the volumes shown, m, separated by commas (default: fifths of the range "
+        "common to all tables)",
     )
     history.add_argument(
         "--courses",
         metavar="FILE",
-        help="courses.csv of an upright tank, where no record has its courses",
+        help="courses.csv of a vertical tank, if no record contains its courses",
     )
     history.add_argument(
-        "--out", metavar="DIR", help="write history.json and papers there, all or nothing"
+        "--out", metavar="DIR", help="write history.json and reports to this folder, all or nothing"
     )
     add_language(history)
     history.add_argument("--quiet", action="store_true", help="no progress, only problems")

@@ -18,53 +18,60 @@ def add(commands):
     """The parser of `tankcal import`."""
     parser = commands.add_parser(
         "import",
-        help="read field books or a list of points into a job",
-        description="Read the files that total stations export (Leica GSI, RW5, Trimble JobXML, "
-        "Sokkia SDR33, plain tables) and write the tables of a job: set-ups, bare hits of the "
-        "wall, control targets, readings that tie set-ups, all or nothing. A list of points (CSV) "
-        "with headings of its own becomes points.csv, or the table that --table names. "
-        "docs/import.md says what is read of each format.",
-        epilog="exit status: 0 done; 2 the files or the choices must be mended (one line per "
-        "problem: file, row, what was expected; nothing is written then).",
+        help="import field books or a list of points into a job",
+        description="Read the files of total stations (Leica GSI, RW5, Trimble JobXML, Sokkia "
+        "SDR33, plain tables) and write the tables of a job, all or nothing: set-ups, "
+        "reflectorless readings of the wall, control targets, and readings that tie set-ups. A "
+        "list of points (CSV) with your own headings becomes points.csv, or the table that "
+        "--table names. docs/import.md describes each format.",
+        epilog="exit status: 0 done; 2 the files or the options must be corrected (one line per "
+        "problem: file, row, expected value; no file is written).",
     )
     parser.add_argument(
         "names", metavar="FILE", nargs="+", help="the files, in the order of the measurement"
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="the folder of the job (default: this folder, if it is one)"
+        "--out", metavar="DIR", help="the folder of the job (default: this folder, if it is a job)"
     )
     parser.add_argument(
         "--format",
         choices=("gsi", "rw5", "jxl", "sdr", "csv"),
-        help="of all files (default: by their content)",
+        help="format of all files (default: determined from the content)",
     )
     parser.add_argument(
-        "--profile", metavar="FILE.toml", help="which column of a plain table is what"
+        "--profile", metavar="FILE.toml", help="profile: meaning of the columns of a plain table"
     )
     parser.add_argument(
-        "--table", metavar="NAME", help="the table of the job that a list becomes (default: points)"
+        "--table",
+        metavar="NAME",
+        help="the table of the job to which a list is converted (default: points)",
     )
     parser.add_argument(
         "--column",
         metavar="HEADING=COLUMN",
         action="append",
         default=[],
-        help="what a heading of a list means, such as 'Este (m)=x_m'",
+        help="meaning of a heading of a list, such as 'Este (m)=x_m'",
     )
     parser.add_argument(
-        "--yes", action="store_true", help="write a list without asking at the terminal"
+        "--yes", action="store_true", help="write a list without confirmation at the terminal"
     )
     for name, text in (
-        ("hits", "names or codes of bare hits, 1-200 or W* (default: those that begin with WALL, "
-         "HIT, PAREDE or PARED)"),
-        ("control", "names or codes of control targets (default: targets read again)"),
-        ("leave", "names or codes that are not used"),
-        ("check", "names or codes of hits that are only compared (use = check)"),
+        ("hits", "names or codes of reflectorless readings of the wall, 1-200 or W* (default: "
+        "names or codes that begin with WALL, HIT, PAREDE or PARED)"),
+        ("control", "names or codes of control targets (default: targets with repeated readings)"),
+        ("leave", "names or codes to leave out"),
+        ("check", "names or codes of hits for comparison only (use = check)"),
     ):  # fmt: skip
         parser.add_argument(f"--{name}", metavar="PATTERN", action="append", default=[], help=text)
-    parser.add_argument("--no-hits", action="store_true", help="there are no hits, only targets")
     parser.add_argument(
-        "--instrument", metavar="NAME", default="", help="its name in instruments.toml"
+        "--no-hits", action="store_true", help="the files contain targets only, no hits"
+    )
+    parser.add_argument(
+        "--instrument",
+        metavar="NAME",
+        default="",
+        help="name of the instrument in instruments.toml",
     )
     for name, what in (("mm", "distances"), ("arcsec", "angles")):
         parser.add_argument(
@@ -84,19 +91,19 @@ def add(commands):
         "--codes",
         choices=("before", "after"),
         help="code blocks of GSI (words 41 to 49) were stored before or after their readings "
-        "(default: they are told, and not used)",
+        "(default: reported, not used)",
     )
     parser.add_argument(
         "--station-code",
         metavar="CODE",
-        help="the code whose blocks begin a station in GSI: word 42 its name, word 43 the height "
-        "of the instrument in millimetres",
+        help="code of the GSI blocks that begin a station: word 42 is the station name, word 43 "
+        "the instrument height in millimetres",
     )
     parser.add_argument(
-        "--no-control", action="store_true", help="write no known coordinates to control.csv"
+        "--no-control", action="store_true", help="do not write known coordinates to control.csv"
     )
     parser.add_argument(
-        "--replace", action="store_true", help="replace tables that have rows already"
+        "--replace", action="store_true", help="replace tables that already contain rows"
     )
     add_language(parser)
     add_json(parser)
@@ -110,7 +117,7 @@ def _time(text):
         raise refuse_argument(
             message(
                 "option_time",
-                "found {text!r}; expected a date with its time, such as 2026-07-14T09:00",
+                "found {text!r}; expected a date with the time, such as 2026-07-14T09:00",
                 text=text,
             )
         ) from None
@@ -183,7 +190,8 @@ def _refuse_workbook(folder):
     if (folder / WORKBOOK_FILE).is_file() and not (folder / "job.toml").is_file():
         text = message(
             "import_into_workbook",
-            "is filled in as {book}; expected a job of text files: tankcal new ANOTHER-FOLDER",
+            "contains the workbook {book}; expected a job with CSV files: tankcal new "
+            "ANOTHER-FOLDER",
             book=WORKBOOK_FILE,
         )
         raise InputError(Problem(folder.resolve().name, text))
@@ -247,8 +255,8 @@ def _say_next(folder, survey):
         job = folder.parent / f"{folder.resolve().name or 'tank'}-job"
         text = message(
             "import_without_job",
-            "{folder} has no job.toml, so it cannot be run: make an empty job, then import once"
-            " more with --out {job}, which fills in its empty tables",
+            "{folder} has no job.toml, so tankcal run cannot compute it: create an empty job, "
+            "then repeat the import with --out {job}, which fills in the empty tables of that job",
             folder=str(folder),
             job=str(job),
         )

@@ -29,10 +29,10 @@ def add(commands):
     """The parser of `tankcal intercomparison` and its commands."""
     parser = commands.add_parser(
         "intercomparison",
-        help="packages of simulated surveys with sealed truth, answers of any software, scores",
-        description="A proficiency test of software that calibrates tanks: make a package of "
-        "simulated surveys whose true volumes are sealed, answer it, score answers of any "
-        "software. docs/intercomparison.md has the formats and the formulas.",
+        help="compare software: simulated surveys with sealed true volumes, answers, scores",
+        description="Run a proficiency test of software for tank calibration: create a package of "
+        "simulated surveys with sealed true volumes, answer it, and score the answers of any "
+        "software. docs/intercomparison.md describes the formats and the formulas.",
     )
     parser.set_defaults(shown=parser)
     inner = parser.add_subparsers(metavar="WHAT")
@@ -45,28 +45,34 @@ def add(commands):
 def _add_make(commands):
     make = commands.add_parser(
         "make",
-        help="draw tanks, survey them, seal their volumes",
-        description="Write package (to publish), sealed/truth.json (to keep until all answers are "
-        "in) and practice (the same with its truth) into a new folder. The SHA-256 of the truth "
-        "stands in the package.",
+        help="simulate tanks and their surveys, and seal the true volumes",
+        description="Write package (for publication), sealed/truth.json (secret until all answers "
+        "are received) and practice (a package with its true volumes) to a new folder. The "
+        "package contains the SHA-256 of the truth.",
     )
-    make.add_argument("directory", metavar="DIR", help="the folder to make")
-    make.add_argument("--tanks", metavar="N", type=_tanks, default=6, help="how many (default: 6)")
+    make.add_argument("directory", metavar="DIR", help="the folder to create")
+    make.add_argument(
+        "--tanks", metavar="N", type=_tanks, default=6, help="number of tanks (default: 6)"
+    )
     make.add_argument(
         "--practice", metavar="N", type=_tanks_or_none, default=1,
-        help="tanks for practice, with their truth (default: 1; 0: none)",
+        help="number of practice tanks, with their true volumes (default: 1; 0: none)",
     )  # fmt: skip
     make.add_argument(
-        "--seed", metavar="S", type=parse_count, default=1, help="of the draws (default: 1)"
+        "--seed",
+        metavar="S",
+        type=parse_count,
+        default=1,
+        help="seed of the simulation (default: 1)",
     )
     make.add_argument(
         "--secret", metavar="HEX", type=_secret,
-        help="64 hexadecimal digits out of a truth file, to make its package again (default: by "
-        "lot)",
+        help="64 hexadecimal digits from a truth file, to create its package again (default: "
+"random)",
     )  # fmt: skip
     make.add_argument(
         "--methods", metavar="METHOD", nargs="+", choices=METHODS, default=list(METHODS),
-        help=f"of the surveys: {', '.join(METHODS)} (default: all)",
+        help=f"survey methods: {', '.join(METHODS)} (default: all)",
     )  # fmt: skip
     _add_common(make)
     make.set_defaults(command=_make)
@@ -76,8 +82,7 @@ def _add_template(commands):
     template = commands.add_parser(
         "template",
         help="write empty forms for the answers to a package",
-        description="Write participant.toml and a table for each survey, with the heights that "
-        "are asked and nothing else.",
+        description="Write participant.toml and a table for each survey with the required heights.",
     )
     _add_package_and_answers(template)
     template.set_defaults(command=_template)
@@ -86,9 +91,9 @@ def _add_template(commands):
 def _add_answer(commands):
     answer = commands.add_parser(
         "answer",
-        help="compute a package by tankcal and write its answers",
-        description="Run tankcal on every survey of a package and write the answers as any "
-        "participant does.",
+        help="compute a package with tankcal and write the answers",
+        description="Run tankcal on every survey of a package and write the answers in the form "
+        "required of any participant.",
     )
     _add_package_and_answers(answer)
     answer.set_defaults(command=_answer)
@@ -98,18 +103,20 @@ def _add_score(commands):
     score = commands.add_parser(
         "score",
         help="score answers against the truth",
-        description="Check that the truth is the one that was sealed, and tell error, E_n, "
-        "coverage and form of every table, of several participants together.",
-        epilog="exit status: 0 done, whatever the scores; 2 answers or truth must be mended (one "
-        "line per problem).",
+        description="Check that the truth is the sealed truth, and report error, E_n, coverage "
+        "and form of every table of all participants.",
+        epilog="exit status: 0 done, whatever the scores; 2 answers or truth must be corrected "
+        "(one line per problem).",
     )
     score.add_argument("names", metavar="ANSWERS", nargs="+", help="folders of answers")
     score.add_argument("--truth", metavar="TRUTH", required=True, help="truth.json, or its folder")
     score.add_argument(
-        "--package", metavar="PACKAGE", help="the package: its manifest must name this truth, too"
+        "--package", metavar="PACKAGE", help="the package: its manifest must also name this truth"
     )
     score.add_argument(
-        "--out", metavar="DIR", help="write scores.json, page and workbook there, all or nothing"
+        "--out",
+        metavar="DIR",
+        help="write scores.json, web page and workbook to this folder, all or nothing",
     )
     _add_common(score)
     add_json(score)
@@ -118,7 +125,7 @@ def _add_score(commands):
 
 def _add_package_and_answers(parser):
     parser.add_argument("package", metavar="PACKAGE", help="the folder of a package")
-    parser.add_argument("--out", metavar="ANSWERS", required=True, help="the folder to make")
+    parser.add_argument("--out", metavar="ANSWERS", required=True, help="the folder to create")
     _add_common(parser)
 
 
@@ -178,9 +185,14 @@ def _make(options):
             )
             write_files(folder / "practice", {**practice.files, TRUTH.file: practice.truth})
     show.end()
-    say(message("ic_keep_sealed", "keep {file} to yourself until all answers are in; its SHA-256 "
-                "stands in {manifest}", file=str(out / "sealed" / TRUTH.file),
-                manifest=str(out / "package" / "manifest.json")))  # fmt: skip
+    say(
+        message(
+            "ic_keep_sealed",
+            "keep {file} secret until all answers are received; {manifest} contains its SHA-256",
+            file=str(out / "sealed" / TRUTH.file),
+            manifest=str(out / "package" / "manifest.json"),
+        )
+    )
     print_paths(out, ["package", "sealed", *(["practice"] if options.practice else [])])
 
 

@@ -24,7 +24,7 @@ def main():
     from tankcal.survey.network import adjust
 
     if not available():
-        text = message("kernels_no_numba", "numba is not installed: nothing to compile")
+        text = message("kernels_no_numba", "numba is not installed: no loop was compiled")
         print(text, file=sys.stderr)
         return 1
     adjusted = adjust(small_survey())
@@ -40,14 +40,14 @@ def main():
     if not mark_as_kept():
         text = message(
             "kernels_not_kept",
-            "{folder} may not be written to: compiled loops were not kept",
+            "{folder} is write-protected: the compiled loops were not saved",
             folder=package,
         )
         print(text, file=sys.stderr)
         return 1
     text = message(
         "kernels_kept",
-        "{count} compiled loops are kept in {folder}",
+        "{count} compiled loops are saved in {folder}",
         count=len(kept), folder=package,
     )  # fmt: skip
     print(text)

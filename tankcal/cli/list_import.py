@@ -31,7 +31,8 @@ def import_list(found, options):
         complain(
             message(
                 "list_not_written",
-                "nothing was written; --column 'HEADING=COLUMN' gives a heading another meaning",
+                "no file was written; --column 'HEADING=COLUMN' assigns another meaning to a "
+                "heading",
             )
         )
         return 2

@@ -15,7 +15,7 @@ def add_json(parser):
         "--json",
         dest="machine",
         action="store_true",
-        help="print one JSON object instead of lines of text, when it fails too; implies --quiet",
+        help="print one JSON object in place of lines of text, also for errors; implies --quiet",
     )
 
 

@@ -10,12 +10,13 @@ def add(commands):
     """The parser of `tankcal docs`."""
     parser = commands.add_parser(
         "docs",
-        help="show the documentation that is installed",
-        description="Print a page of the documentation as text (Markdown), or, without a name, the "
-        "list of the pages and the folder that they are in. What help and messages call "
-        "docs/NAME.md is the page NAME.",
+        help="show the installed documentation",
+        description="Print a page of the documentation as text (Markdown). Without a name, list "
+        "the pages and their folder. The page docs/NAME.md has the name NAME.",
     )
-    parser.add_argument("page", metavar="NAME", nargs="?", help="of a page, such as job-format")
+    parser.add_argument(
+        "page", metavar="NAME", nargs="?", help="name of a page, such as job-format"
+    )
     parser.set_defaults(command=_docs)
 
 
@@ -41,7 +42,7 @@ def _docs(options):
 
         text = message(
             "page_unknown",
-            "no such page{hint}; expected one of those that tankcal docs lists",
+            "no such page{hint}; expected a page that tankcal docs lists",
             hint=nearest(name, names),
         )
         raise InputError(Problem(options.page[:60], text))

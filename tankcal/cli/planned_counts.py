@@ -45,8 +45,8 @@ def counted(kind, count):
             message("plan_targets", "{count} targets", count=count),
         ),
         "straps": (
-            message("plan_one_strap", "{count} reading of the tape", count=count),
-            message("plan_straps", "{count} readings of the tape", count=count),
+            message("plan_one_strap", "{count} tape reading", count=count),
+            message("plan_straps", "{count} tape readings", count=count),
         ),
         "lines": (
             message("plan_one_line", "{count} reference line", count=count),

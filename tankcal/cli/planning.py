@@ -24,18 +24,18 @@ def add(commands):
     """The parser of `tankcal plan`."""
     plan = commands.add_parser(
         "plan",
-        help="plan a survey: the uncertainty of the table before anything is measured",
-        description="Read and check a plan (a job without measured values), find out what is seen "
-        "from where, and predict how well points, sections and every row of the table will be "
-        "known. docs/planning.md says what a plan holds.",
-        epilog="exit status: 0 done; 2 the plan must be mended; 3 the survey would have no sound "
-        "solution.",
+        help="plan a survey: predict the uncertainty of the table before the measurement",
+        description="Read and check a plan (a job without measured values), determine which "
+        "targets are visible from which station, and predict the uncertainty of points, sections "
+        "and every row of the table. docs/planning.md describes the plan.",
+        epilog="exit status: 0 done; 2 the plan must be corrected; 3 the survey would have no "
+        "valid solution.",
     )
     plan.add_argument("plan", metavar="PLAN", help="a plan's folder, or its plan.toml")
     plan.add_argument(
         "--out",
         metavar="DIR",
-        help="write prediction, field sheets and an empty job there, all or nothing",
+        help="write prediction, field sheets and an empty job to this folder, all or nothing",
     )
     plan.add_argument(
         "--workbook",
@@ -45,7 +45,8 @@ def add(commands):
     plan.add_argument(
         "--changes",
         action="store_true",
-        help="try every change of one item: what helps most, what can be spared",
+        help="evaluate every change of one item: the most useful additions and the dispensable "
+        "items",
     )
     plan.add_argument(
         "--smallest",
@@ -56,16 +57,20 @@ def add(commands):
         "--simulate",
         metavar="N",
         type=parse_list,
-        help="draw the readings of N surveys, compute each: do they scatter as predicted?",
+        help="simulate the readings of N surveys, compute each survey, and compare the scatter "
+        "with the prediction",
     )
     plan.add_argument(
         "--blunders",
         metavar="SHARE",
         type=share,
         default=0.0,
-        help="share of the simulated readings that are off by 20 sds, such as 0.01 (default: none)",
+        help="share of the simulated readings with a blunder of 20 standard deviations, such as "
+        "0.01 (default: none)",
     )
-    plan.add_argument("--seed", type=parse_count, default=1, help="of the simulation (default 1)")
+    plan.add_argument(
+        "--seed", type=parse_count, default=1, help="seed of the simulation (default 1)"
+    )
     add_language(plan)
     plan.add_argument("--quiet", action="store_true", help="no progress, only problems")
     plan.set_defaults(command=_plan)
@@ -125,12 +130,14 @@ def _refuse_idle(options):
     problems = []
     if options.blunders and options.simulate is None:
         expected = message(
-            "plan_nothing_simulated", "nothing would be simulated; expected --simulate N as well"
+            "plan_nothing_simulated",
+            "has no effect without a simulation; expected --simulate N as well",
         )
         problems.append(Problem("--blunders", expected))
     if options.workbook and options.out is None:
         expected = message(
-            "plan_nothing_written", "nothing would be written; expected --out DIR as well"
+            "plan_nothing_written",
+            "has no effect without an output folder; expected --out DIR as well",
         )
         problems.append(Problem("--workbook", expected))
     if problems:
@@ -143,7 +150,7 @@ def _refuse_simulation(plan, options):
     if options.simulate is not None and plan.design.runs:
         expected = message(
             "plan_runs_not_simulated",
-            "not for a plan of runs of liquid; expected a plan without [[runs]]",
+            "not possible for a plan with runs of liquid; expected a plan without [[runs]]",
         )
         raise InputError(Problem("--simulate", expected))
 
@@ -153,7 +160,8 @@ def _refuse_unlimited(plan):
 
     if plan.limits.relative_u is None:
         expected = message(
-            "plan_no_limit", "missing; expected the U over volume that --smallest is to meet"
+            "plan_no_limit",
+            "missing; expected the relative uncertainty U/V that --smallest must meet",
         )
         raise InputError(Problem("plan.toml", expected, None, "limits.relative_u"))
 
@@ -177,7 +185,7 @@ def _remedies(plan, error, options, show):
     found = what_would_do(plan, progress=show.part)
     show.end()
     if found:
-        yield message("plan_remedies", "what would determine it, the best first:")
+        yield message("plan_remedies", "additions that would determine the survey, best first:")
     for one in found[:SHOWN]:
         yield message(
             "plan_remedy",
@@ -215,8 +223,8 @@ def _summary(prediction):
     yield plan_holds(plan, counts)
     yield message(
         "plan_network",
-        "network: {rows} observations, {unknowns} unknowns, redundancy {dof}; mean sd of a target "
-        "{sd} mm",
+        "network: {rows} observations, {unknowns} unknowns, redundancy {dof}; mean standard "
+        "deviation of a target {sd} mm",
         rows=solution.rows,
         unknowns=solution.estimated,
         dof=solution.dof,
@@ -232,7 +240,7 @@ def _summary(prediction):
     if prediction.undetermined:
         yield message(
             "plan_not_determined",
-            "points that are not determined: {count} ({points})",
+            "points not determined: {count} ({points})",
             count=len(prediction.undetermined),
             points=_first(prediction.undetermined),
         )
@@ -348,8 +356,8 @@ def _item(item, name):
     if item == "target_row":
         return message("plan_row", "target row {section}", section=name.removeprefix(ROW))
     if name == IMAGES:
-        return message("plan_all_images", "reading all image points")
-    return message("plan_all_sets", "reading all sets of the total station")
+        return message("plan_all_images", "measurement of all image points")
+    return message("plan_all_sets", "measurement of all sets of the total station")
 
 
 def _design(path):
@@ -370,7 +378,7 @@ def _design(path):
         yield message(
             "plan_smallest_worth",
             "  U/V {before} before, {after} after; cost {start_cost:g} before, {cost:g} after; "
-            "plans tried: {tried}",
+            "plans evaluated: {tried}",
             **values,
             start_cost=path.start_cost,
             cost=path.cost,
@@ -378,11 +386,11 @@ def _design(path):
     else:
         yield message(
             "plan_smallest_without_cost",
-            "  U/V {before} before, {after} after; plans tried: {tried}",
+            "  U/V {before} before, {after} after; plans evaluated: {tried}",
             **values,
         )
     if path.prediction.meets is False:
-        yield message("plan_none_meets", "  no plan that was tried meets the limit")
+        yield message("plan_none_meets", "  no evaluated plan meets the limit")
 
 
 def _scatter(found):
@@ -390,9 +398,9 @@ def _scatter(found):
         return
     yield message(
         "plan_scatter",
-        "{runs} simulated surveys, scatter over prediction: coordinates {ratio:.3f}, volume "
-        "{volume_ratio:.3f} (known to {ratio_sd:.2g}); {aside:.1f} values rejected on "
-        "average, without a solution: {failed}",
+        "{runs} simulated surveys, ratio of scatter to prediction: coordinates {ratio:.3f}, "
+        "volume {volume_ratio:.3f} (standard deviation {ratio_sd:.2g}); {aside:.1f} values "
+        "rejected on average, without a solution: {failed}",
         runs=found.runs,
         ratio=found.ratio,
         volume_ratio=found.volume_ratio,

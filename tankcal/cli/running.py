@@ -37,7 +37,7 @@ def add(commands):
         help="run the shipped example",
         description="Compute the shipped example, a reconstruction of the tank of Silva 1995.",
     )
-    demo.add_argument("--out", metavar="DIR", help="where to write", default="tankcal-demo-results")
+    demo.add_argument("--out", metavar="DIR", help="output folder", default="tankcal-demo-results")
     demo.add_argument("--quiet", action="store_true", help="no progress, only problems")
     demo.set_defaults(command=_demo)
 
@@ -46,48 +46,49 @@ def _add_run(commands):
     run = commands.add_parser(
         "run",
         help="compute a job and write its results",
-        description="Read and check a job, compute it, and write the results, all or nothing: "
+        description="Read, check and compute a job, and write the results, all or nothing: "
         "record.json, points.csv, sections.csv, capacity.csv, capacity.xlsx, certificate.xml, "
         "report.ipynb, certificate.pdf, working-papers.pdf, report.pdf (both), field-table.pdf "
         "and report.html. An adjusted survey adds points_cov.npz, photos.csv, cameras.csv, "
         "groups.csv and residuals.csv.",
-        epilog="exit status: 0 done; 2 the input must be mended; 3 no sound solution, or, with "
-        "--strict, the adjustment is in doubt. Then nothing is written.",
+        epilog="exit status: 0 done; 2 the input must be corrected; 3 the survey has no valid "
+        "solution, or, with --strict, the adjustment is doubtful; no file is written.",
     )
     run.add_argument("job", metavar="JOB", help="a job folder, its job.toml, or a job workbook")
     run.add_argument(
         "--out",
         metavar="DIR",
-        help="where to write (default: results in the job's folder, or NAME-results beside "
+        help="output folder (default: results in the folder of the job, or NAME-results beside "
         "NAME.xlsx); earlier results there are replaced",
     )
     run.add_argument(
         "--only",
         choices=("adjustment",),
-        help="stop after the adjustment of the survey; no tank is needed, and adjustment.xlsx "
-        "takes the place of capacity.xlsx",
+        help="stop after the adjustment of the survey; no tank is required, and adjustment.xlsx "
+        "replaces capacity.xlsx",
     )
     run.add_argument(
         "--strict",
         action="store_true",
-        help="write nothing when the global test of the adjustment fails, or when what was set "
-        "aside as a blunder may not be the one (exit status 3)",
+        help="write no file if the global test of the adjustment fails, or if a rejected "
+        "observation may not be the blunder (exit status 3)",
     )
     of_papers = run.add_mutually_exclusive_group()
     add_letterhead(of_papers)
     of_papers.add_argument(
         "--no-papers",
         action="store_true",
-        help="write record and CSV files only; tankcal report makes workbook and papers of them",
+        help="write the record and the CSV files only; tankcal report creates workbook and "
+        "reports from the record",
     )
     run.add_argument(
         "--cluster",
         metavar="WHERE",
         type=parse_cluster,
         default="auto",
-        help="who reads point clouds: local (a worker for each core), a number of workers (0: "
-        "none), or the address of a dask scheduler (default: workers on this machine where they "
-        "pay); the results are the same",
+        help="workers for point clouds: local (one worker per core), a number of workers (0: "
+        "none), or the address of a dask scheduler (default: workers on this machine where "
+        "they save time); the results do not depend on the workers",
     )
     run.add_argument("--quiet", action="store_true", help="no progress, only problems")
     add_json(run)
@@ -199,7 +200,7 @@ def _idle_cluster(cluster, clouds):
     """A warning for workers that were asked for, where there are no clouds for them to read."""
     if cluster in (None, "auto", 0) or clouds is not None:
         return ()
-    text = message("cluster_idle", "without effect: no point cloud is read")
+    text = message("cluster_idle", "without effect: the job has no point cloud")
     return (Problem("--cluster", text),)
 
 
@@ -225,8 +226,8 @@ def _capacity(result):
     if not stated.U_m3[-1] > 0:
         return message(
             "holds_without_u",
-            "{tank}: {volume} {unit} at {height} m, no uncertainty stated, because none was "
-            "declared{points}",
+            "{tank}: {volume} {unit} at {height} m, no uncertainty stated, because no input has "
+            "a declared uncertainty{points}",
             tank=result.job.tank.id,
             volume=fixed(factor * top.value_m3, decimals, marks()),
             unit=unit,
@@ -274,7 +275,7 @@ def _adjust(cluster, source, out, quiet, strict, papers, tell=_tell):
 def _refuse_failed(adjustment):
     """Raise when there is an adjustment that is in doubt, or whose global test failed."""
     if adjustment is not None and adjustment.doubts:
-        nothing = message("strict_nothing", "nothing was written (--strict)")
+        nothing = message("strict_nothing", "no file was written (--strict)")
         raise SolutionError(*(one.text for one in adjustment.doubts), nothing)
     if adjustment is None or adjustment.redundancy <= 0:
         return
@@ -284,7 +285,7 @@ def _refuse_failed(adjustment):
             message(
                 "strict_test_failed",
                 "the global test of the adjustment failed: v'Pv = {chi2:.1f}, expected {low:.1f} "
-                "to {high:.1f} ({dof} degrees of freedom, sigma0 = {sigma0:.3f}); nothing was "
+                "to {high:.1f} ({dof} degrees of freedom, sigma0 = {sigma0:.3f}); no file was "
                 "written (--strict)",
                 chi2=test.chi2,
                 low=test.low,
@@ -305,7 +306,7 @@ def _summary(adjustment):
     if free.any():
         found = precision(adjustment.xyz_m[free], adjustment.covariance_m2[free])
         sd = format_significant(1000 * found.mean_sd_m, 3, marks())
-        mean = message("mean_sd", ", mean sd {sd} mm", sd=sd)
+        mean = message("mean_sd", ", mean standard deviation {sd} mm", sd=sd)
     return message(
         "adjusted",
         "adjustment: {fit}, {set_aside}, {points}{mean}",

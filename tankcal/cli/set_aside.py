@@ -21,7 +21,7 @@ def lines_set_aside(result, adjustment):
         if len(names) > NAMED:
             yield message(
                 "set_aside_and_more",
-                "  {what}: {names} and {more} more, in the working papers",
+                "  {what}: {names} and {more} more (see the working papers)",
                 what=told.what,
                 names=names[:NAMED],
                 more=len(names) - NAMED,

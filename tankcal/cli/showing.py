@@ -116,8 +116,8 @@ def print_doubts(warnings):
         complain(
             message(
                 "doubtful_input",
-                "DOUBTFUL INPUT: the result depends on it (the first page of the certificate "
-                "says so):",
+                "DOUBTFUL INPUT: the results depend on it; see also the first page of the "
+                "certificate:",
             )
         )
     warn(warnings)

@@ -22,14 +22,14 @@ def add(commands):
     """The parser of `tankcal read-table`."""
     parser = commands.add_parser(
         "read-table",
-        help="read radii, head and zero out of a former capacity table",
-        description="Read the geometry of a tank out of a capacity table of any origin: of an "
-        "upright one radii of the courses, density of the head, zero, seams, things in the tank, "
-        "of a lying one or a sphere its sizes, each with what rounding leaves uncertain. "
-        "With --out a job is written that gives the table again, "
-        "for another density or temperature, too. docs/read-table.md says how it is found.",
-        epilog="exit status: 0 done; 2 table or courses must be mended (one line per problem); "
-        "3 the table does not determine its tank.",
+        help="determine radii, head and zero from a former capacity table",
+        description="Determine the geometry of a tank from a capacity table of any origin. For a "
+        "vertical tank: radii of the courses, density of the head, zero, seams and deadwood. "
+        "For a horizontal tank or a sphere: its dimensions. Each result has the uncertainty "
+        "due to rounding. With --out, write a job that reproduces the table, also for "
+        "another density or temperature. docs/read-table.md describes the method.",
+        epilog="exit status: 0 done; 2 the table or the courses must be corrected (one line per "
+        "problem); 3 the table does not determine the tank.",
     )
     parser.add_argument(
         "file",
@@ -40,23 +40,25 @@ def add(commands):
     parser.add_argument(
         "--courses",
         metavar="FILE",
-        help="courses.csv: course, height_m (blank: seams are found), thickness_mm, from the "
+        help="courses.csv: course, height_m (blank: seams are estimated), thickness_mm, from the "
         "bottom up",
     )
     parser.add_argument(
         "--kind",
         choices=("vertical", "horizontal", "sphere"),
-        help="kind of tank (default: as former.toml says, else vertical)",
+        help="kind of tank (default: kind in former.toml, else vertical)",
     )
-    parser.add_argument("--former", metavar="FILE", help="former.toml: what else is known of it")
-    parser.add_argument("--out", metavar="DIR", help="write a job there, all or nothing")
+    parser.add_argument(
+        "--former", metavar="FILE", help="former.toml: further facts about the former table"
+    )
+    parser.add_argument("--out", metavar="DIR", help="write a job to this folder, all or nothing")
     parser.add_argument(
         "--e-gpa", metavar="GPA", type=positive, default=206.0,
         help="Young's modulus of the shell (default 206)",
     )  # fmt: skip
     parser.add_argument(
         "--bottom", metavar="M", type=positive,
-        help="dip of the highest point of the bottom, m (default: found)",
+        help="dip of the highest point of the bottom, m (default: estimated)",
     )  # fmt: skip
     add_language(parser)
     parser.set_defaults(command=_read_table)
@@ -123,11 +125,11 @@ def _of_solid(found):
         yield _ends(found, fit)
     if "end_depth" in values:
         yield _size(message("read_depth", "depth of the ends"), values["end_depth"])
-    yield _size(message("read_zero_of_solid", "dips are less than the depth by"), values["zero"])
+    yield _size(message("read_zero_of_solid", "depth minus dip"), values["zero"])
     if hasattr(found, "tilted"):
         yield from _tilt(found)
     yield message(
-        "read_left_solid", "left: {rms} L (rms)", rms=fixed(1000 * fit.rms_m3, 2, marks())
+        "read_left_solid", "residuals: {rms} L (rms)", rms=fixed(1000 * fit.rms_m3, 2, marks())
     )
 
 
@@ -140,7 +142,7 @@ def _ends(found, fit):
         return message("read_ends", "ends: {ends}", ends=ends)
     return message(
         "read_ends_best",
-        "ends: {ends}; the next, {other}, raises chi2 by {by} ({limit} would be told)",
+        "ends: {ends}; the next best form, {other}, raises chi2 by {by} (significant from {limit})",
         ends=ends,
         other=others[0].replace("_", " "),
         by=fixed(found.worse_by[others[0]], 0, marks()),
@@ -153,8 +155,8 @@ def _tilt(found):
     if found.tilted is None:
         yield message(
             "read_no_tilt",
-            "a tilt as one more unknown: none was found that fits better; up to {largest} mm/m "
-            "either way would fit as well",
+            "tilt as additional unknown: no tilt improves the fit; up to {largest} mm/m in "
+            "either direction fits as well",
             largest=fixed(largest, 1, marks()),
         )
         return
@@ -162,8 +164,8 @@ def _tilt(found):
     if found.tilted is not found.best:
         yield message(
             "read_tilt",
-            "a tilt as one more unknown: {tilt} mm/m, u {u} mm/m; it lowers chi2 by {gain}, and "
-            "{least} to {largest} mm/m either way would fit",
+            "tilt as additional unknown: {tilt} mm/m, u {u} mm/m; it lowers chi2 by {gain}; "
+            "{least} to {largest} mm/m in either direction would fit",
             tilt=fixed(tilt, 2, marks()),
             u=fixed(u, 2, marks()),
             gain=fixed(found.tilt_gain, 1, marks()),
@@ -174,8 +176,8 @@ def _tilt(found):
     other, zero = found.tilted.mirrored
     yield message(
         "read_leaning",
-        "tilt: {tilt} mm/m, u {u} mm/m: no level tank explains the rows; {other} mm/m with dips "
-        "less by {zero} mm gives the same volumes",
+        "tilt: {tilt} mm/m, u {u} mm/m: no level tank explains the rows; {other} mm/m with "
+        "dips smaller by {zero} mm gives the same volumes",
         tilt=fixed(tilt, 2, marks()),
         u=fixed(u, 2, marks()),
         other=fixed(1000 * other, 2, marks()),
@@ -199,8 +201,8 @@ def _of_table(found):
         rms, largest, radii = found.without_head
         yield message(
             "read_head_left_out",
-            "  with the head left out the rows depart by {rms} L (rms), {largest} L at most, and "
-            "radii by up to {radii} mm",
+            "  without the head, residuals of {rms} L (rms), at most {largest} L, and radii that "
+            "differ by up to {radii} mm",
             rms=fixed(1000 * rms, 2, marks()),
             largest=fixed(1000 * largest, 1, marks()),
             radii=fixed(1000 * abs(radii - found.radii_m).max(), 2, marks()),
@@ -211,7 +213,7 @@ def _of_table(found):
     for one in found.fittings:
         yield _thing(one)
     if not found.fittings:
-        yield message("read_no_things", "nothing in the tank shows")
+        yield message("read_no_things", "no deadwood detected")
     if found.roof_m3 is not None:
         volume, u = _with_u(found.roof_m3.value, found.roof_m3.u)
         yield message(
@@ -220,14 +222,14 @@ def _of_table(found):
     volume, u = _with_u(found.base_m3.value, found.base_m3.u or found.expected_m3)
     yield message(
         "read_lowest",
-        "rows from {lowest} m on; {volume} m3 below that, u {u} m3",
+        "rows used from {lowest} m upwards; {volume} m3 below, u {u} m3",
         lowest=fixed(found.lowest_m, 3, marks()),
         volume=volume,
         u=u,
     )
     yield message(
         "read_left",
-        "left: {rms} L (rms), {largest} L at most; rounding alone leaves {expected} L (rms)",
+        "residuals: {rms} L (rms), at most {largest} L; rounding alone causes {expected} L (rms)",
         rms=fixed(1000 * found.rms_m3, 2, marks()),
         largest=fixed(1000 * found.largest_m3, 2, marks()),
         expected=fixed(1000 * found.expected_m3, 2, marks()),
@@ -239,7 +241,7 @@ def _head(found):
     if found.head == "with":
         return message(
             "read_with_head",
-            "made with the head of {density} kg/m3, u {u} (t = {t})",
+            "computed with the head of {density} kg/m3, u {u} (t = {t})",
             density=density,
             u=u,
             t=fixed(found.t, 0, marks()),
@@ -247,15 +249,15 @@ def _head(found):
     if found.head == "without":
         return message(
             "read_without_head",
-            "without head: {density} kg/m3, u {u} (t = {t})",
+            "computed without head: {density} kg/m3, u {u} (t = {t})",
             density=density,
             u=u,
             t=fixed(found.t, 1, marks()),
         )
     return message(
         "read_undecided_head",
-        "head or none cannot be told from this table (its density has u {u} kg/m3): radii and job "
-        "are for {density} kg/m3",
+        "head not determined by this table (its density has u {u} kg/m3): radii and job are "
+        "for {density} kg/m3",
         density=fixed(found.state.density_kg_m3, 0, marks()),
         u=u,
     )
@@ -265,7 +267,7 @@ def _zero(found):
     if found.zero_m.u == 0:
         return message("read_zero_held", "zero: the bottom of the first course")
     if not found.zero_m.u <= 0.05:
-        return message("read_zero_unknown", "zero: cannot be told from this table")
+        return message("read_zero_unknown", "zero: not determined by this table")
     zero, u = _with_u(1000 * found.zero_m.value, 1000 * found.zero_m.u)
     return message(
         "read_zero",
@@ -277,7 +279,7 @@ def _zero(found):
 
 def _seam(number, seam):
     if not seam.u < 0.04:
-        return message("read_no_seam", "seam {number}: cannot be told", number=number)
+        return message("read_no_seam", "seam {number}: not determined", number=number)
     dip, u = _with_u(seam.value, seam.u)
     return message("read_seam", "seam {number}: {dip} m, u {u} m", number=number, dip=dip, u=u)
 
@@ -286,7 +288,7 @@ def _thing(one):
     volume, u = _with_u(1000 * one.volume_m3.value, 1000 * one.volume_m3.u)
     return message(
         "read_thing",
-        "in the tank from {bottom} to {top} m: {volume} L, u {u} L",
+        "deadwood from {bottom} to {top} m: {volume} L, u {u} L",
         bottom=fixed(one.bottom_m.value, 3, marks()),
         top=fixed(one.top_m.value, 3, marks()),
         volume=volume,

@@ -13,30 +13,30 @@ def add(commands):
     """The parser of `tankcal verify`."""
     verify = commands.add_parser(
         "verify",
-        help="check that the files of a run belong together, and come out again",
-        description="Hold every file of a folder of results against SHA256SUMS, the papers "
-        "against what the record gives when they are made again, the input files of the job, "
-        "where it is at hand, against the hashes in the record, and every number of the record "
-        "against the job computed again. One line a disagreement.",
-        epilog="exit status: 0 nothing disagrees; 2 something does, or there is nothing to "
+        help="check that the files of a run agree and can be reproduced",
+        description="Compare every file of a folder of results with SHA256SUMS, and the reports "
+        "with reports created again from the record. Compare the input files of the job, if "
+        "available, with the hashes in the record, and every number of the record with the job "
+        "computed again. One line per disagreement.",
+        epilog="exit status: 0 no disagreement; 2 at least one disagreement, or no file to "
         "compare.",
     )
     verify.add_argument(
         "results",
         metavar="RESULTS",
-        help="a folder that tankcal wrote: results, a comparison, an inspection, a history, a "
-        "plan, the camera; or a PDF of results",
+        help="a folder written by tankcal: results, comparison, inspection, history, plan or "
+        "camera; or a PDF of results",
     )
     verify.add_argument(
         "--job",
         metavar="DIR",
-        help="folder of the input files, or the job's workbook (default: the folder that the "
-        "results lie in)",
+        help="folder of the input files, or the workbook of the job (default: the parent folder "
+        "of the results)",
     )
     verify.add_argument(
         "--hashes-only",
         action="store_true",
-        help="compare hashes only: no paper is made again, no number computed again",
+        help="compare hashes only, without creating reports or computing numbers again",
     )
     add_language(verify)
     verify.add_argument("--quiet", action="store_true", help="no progress, only problems")
@@ -106,16 +106,19 @@ def _tell(found, hashes_only):
         say(
             message(
                 "verify_no_inputs",
-                "the input files of the job are not here: neither compared nor computed again",
+                "the input files of the job were not found: neither compared nor computed again",
             )
         )
     for one in found.notes:
         say(one)
     if found.papers_again:
-        say(message("verify_papers_again", "the papers were made again and held against these"))
+        say(message("verify_papers_again", "the reports were created again and compared"))
     if hashes_only:
         say(
-            message("verify_hashes_only", "hashes only: no paper made and no number computed again")
+            message(
+                "verify_hashes_only",
+                "hashes only: no report was created and no number was computed again",
+            )
         )
     _sum(found)
 
@@ -125,14 +128,14 @@ def _numbers(again):
     if again.different == 0:
         yield message(
             "verify_same_numbers",
-            "computed again: {count} numbers, all the same bit for bit",
+            "computed again: {count} numbers, all identical bit for bit",
             count=again.numbers,
         )
     elif again.largest is None:
         yield message(
             "verify_rounded_numbers",
-            "computed again: {count} numbers, {different} not the same bit for bit, all of them "
-            "by rounding alone",
+            "computed again: {count} numbers, {different} not identical bit for bit, all by "
+            "rounding only",
             count=again.numbers,
             different=again.different,
         )
@@ -140,9 +143,9 @@ def _numbers(again):
         one = again.largest
         yield message(
             "verify_near_numbers",
-            "computed again: {count} numbers, {different} not the same bit for bit; measured by "
-            "what is allowed, the largest difference is at {place}: {recorded} and now {computed}, "
-            "{relative} of the largest number there (at most {tolerance})",
+            "computed again: {count} numbers, {different} not identical bit for bit; the largest "
+            "difference relative to its tolerance is at {place}: {recorded} in the record, "
+            "{computed} now, {relative} of the largest number there (tolerance {tolerance})",
             count=again.numbers,
             different=again.different,
             place=one.place,
@@ -154,12 +157,13 @@ def _numbers(again):
     made, now = (", ".join(f"{name} {version}" for name, version in versions.items())
                  for versions in (again.made_by, again.computed_by))  # fmt: skip
     if made == now:
-        yield message(
-            "verify_same_versions", "made and computed again by {versions}", versions=made
-        )
+        yield message("verify_same_versions", "computed both times with {versions}", versions=made)
     else:
         yield message(
-            "verify_other_versions", "made by {made}; computed again by {now}", made=made, now=now
+            "verify_other_versions",
+            "computed with {made}; computed again with {now}",
+            made=made,
+            now=now,
         )
 
 
@@ -168,11 +172,18 @@ def _in_part(found):
     by_hash, by_numbers = (", ".join(map(printable, names))
                            for names in (found.by_hash, found.by_numbers))  # fmt: skip
     if by_hash:
-        yield message("verify_by_hash", "compared by their hash in SHA256SUMS alone, which anybody "
-                      "can write again: {files}", files=by_hash)  # fmt: skip
+        yield message(
+            "verify_by_hash",
+            "compared by their hash in SHA256SUMS only, which anybody can recompute: {files}",
+            files=by_hash,
+        )
     if by_numbers:
-        yield message("verify_by_numbers", "of another version of tankcal, compared by their "
-                      "numbers of five digits and more: {files}", files=by_numbers)  # fmt: skip
+        yield message(
+            "verify_by_numbers",
+            "written by another version of tankcal; only numbers of five or more digits were "
+            "compared: {files}",
+            files=by_numbers,
+        )
 
 
 def _sum(found):
@@ -189,8 +200,13 @@ def _sum(found):
     else:
         for text in _in_part(found):
             say(text)
-        say(message("verify_agree_in_part", "{count} files agree as far as they were compared: "
-                    "{file} is sha256:{digest}", **values))  # fmt: skip
+        say(
+            message(
+                "verify_agree_in_part",
+                "{count} files agree within the comparison made: {file} is sha256:{digest}",
+                **values,
+            )
+        )
     if found.manifest_sha256 and found.digest:
         say(message("verify_manifest", "SHA256SUMS is sha256:{digest}",
                     digest=found.manifest_sha256))  # fmt: skip

@@ -21,7 +21,7 @@ def wall_summary(prediction):
     for one in prediction.courses:
         yield message(
             "plan_course_radius",
-            "course {course}: u of its mean radius {sd} mm",
+            "course {course}: u of the mean radius {sd} mm",
             course=one.name,
             sd=format_significant(1000 * one.radius_sd_m, 2, marks()),
         )
@@ -34,7 +34,7 @@ def _filling(found):
     for one in found.dips:
         yield message(
             "plan_dip_beside",
-            "V({dip} m): U = {uncertainty} m3; by geometry alone {before} m3",
+            "V({dip} m): U = {uncertainty} m3; from geometry alone {before} m3",
             dip=fixed(one.dip_m, 3, marks()),
             uncertainty=format_significant(one.U_m3, 2, marks()),
             before=format_significant(one.U_geometry_m3, 2, marks()),
@@ -43,7 +43,7 @@ def _filling(found):
         if one.kind in SCALES:
             yield message(
                 "plan_told_by_liquid",
-                "{name}: u {before} {unit} before the liquid, {after} {unit} after it",
+                "{name}: u {before} {unit} without the liquid, {after} {unit} with it",
                 name=one.name or message("plan_scale_of_all", "scale"),
                 unit=one.unit,
                 before=format_significant(one.u_before, 3, marks()),
@@ -52,7 +52,7 @@ def _filling(found):
     if found.detectable_radius_m is not None:
         yield message(
             "plan_radius_shown",
-            "an offset of all radii of the geometry would show from {radius} mm on",
+            "smallest detectable offset of all radii of the geometry: {radius} mm",
             radius=format_significant(1000 * found.detectable_radius_m, 2, marks()),
         )
 
@@ -64,10 +64,11 @@ def wall_scatter(found):
     low, median, high = found.U_ratios
     yield message(
         "plan_wall_scatter",
-        "{runs} simulated surveys of drawn walls: error of the volume over prediction {ratio:.3f} "
-        "(known to {ratio_sd:.2g}); U over prediction {median:.2f} ({low:.2f} to {high:.2f}); true "
-        "volume within U in {covered} of full tanks, {rows} of all rows; {aside:.1f} readings set "
-        "aside on average, without a solution: {failed}",
+        "{runs} simulated surveys of random walls: ratio of volume error to prediction "
+        "{ratio:.3f} (standard deviation {ratio_sd:.2g}); ratio of U to prediction "
+        "{median:.2f} ({low:.2f} to {high:.2f}); true volume within U in {covered} of full "
+        "tanks, {rows} of all rows; {aside:.1f} readings rejected on average, without a "
+        "solution: {failed}",
         runs=found.runs,
         ratio=found.volume_ratio,
         ratio_sd=found.volume_ratio_sd,
@@ -98,8 +99,8 @@ def wall_item(change):
         "line": message("plan_item_lines", "{name} reference lines", name=name),
         "face": message("plan_item_face", "the second face of the plummet"),
         "level": message("plan_item_level", "the level {name} of each course", name=name),
-        "hit": message("plan_item_hits", "hits of ring {name}, half as many as it has", name=name),
-        "accuracy": message("plan_item_accuracy", "each reading of the tape, with half its s_mm"),
+        "hit": message("plan_item_hits", "hits of ring {name}, half as many as planned", name=name),
+        "accuracy": message("plan_item_accuracy", "each tape reading, with half its s_mm"),
         "station": message(
             "plan_item_station", "a station of the traverse, all {name} from the axis", name=name
         ),
