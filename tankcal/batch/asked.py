@@ -77,7 +77,7 @@ def parse_steps(text):
     if unknown or not named:
         expected = message(
             "batch_steps",
-            "found {text!r}; expected one or some of {steps}, with commas between",
+            "found {text!r}; expected one or more of {steps}, separated by commas",
             text=text[:60],
             steps=[*STEPS],
         )
@@ -89,12 +89,12 @@ def refuse_incomplete(asked, jobs):
     """Raise InputError where a step lacks what it needs of every job: a former table, a profile."""
     former = message(
         "batch_needs_former",
-        "missing; compare needs a former table: a file, a folder of them, or a column former in "
-        "the list of jobs",
+        "missing; compare requires a former table: a file, a folder of tables, or a column "
+        "former in the list of jobs",
     )
     profile = message(
         "batch_needs_profile",
-        "missing; export needs one of those that tankcal export --list shows, or a .toml file",
+        "missing; export requires a profile that tankcal export --list shows, or a .toml file",
     )
     needed = (
         ("compare", "former", "--former", former),

@@ -74,8 +74,8 @@ def do_job(task):
             return _in_the_way(task, error)
         text = message(
             "batch_no_room",
-            "nothing more can be written there ({reason}); expected room for the results: then the "
-            "same command goes on",
+            "no more data can be written there ({reason}); expected space for the results: make "
+            "space and repeat the command to continue",
             reason=reason_of(error),
         )
         raise InputError(Problem(task.out, text)) from error
@@ -84,8 +84,11 @@ def do_job(task):
 def _in_the_way(task, error):
     """What `do_job` gives where something else lies in the place of a job's folder or outcome."""
     path = error.filename2 or error.filename or folder_of(task.out, task.job.name)
-    text = message("batch_in_the_way", "is no file or folder of a batch ({reason}); expected it "
-                   "taken away", reason=reason_of(error))  # fmt: skip
+    text = message(
+        "batch_in_the_way",
+        "is not a file or folder of a batch ({reason}); expected a free path: move it away",
+        reason=reason_of(error),
+    )
     return "failed", [problem_of(Problem(os.path.relpath(path, task.out), text))], 1
 
 
@@ -120,7 +123,7 @@ def _check_folder(task):
 
         text = message(
             "batch_folder_not_seen",
-            "the worker on {machine} does not find it as {path}; expected the folder of the batch "
+            "not found as {path} by the worker on {machine}; expected the folder of the batch "
             "under the same path on all machines of the cluster",
             machine=socket.gethostname(),
             path=task.out,
@@ -137,15 +140,17 @@ def _outcome_of(step, task, clock):
         with clock.step("row"):
             values, warnings = reading.values_of(step, folder_of(task.out, name) / FOLDERS[step])
         if keys_of(task.job, former_or_none(task.job))[step] != key:
-            text = message("batch_changed", "its files changed while it was computed; expected the "
-                           "next batch to compute it again")  # fmt: skip
+            text = message(
+                "batch_changed",
+                "input files changed during the computation; the next batch computes the job again",
+            )
             return _unfinished(key, "failed", [Problem(name, text)])
     except TankcalError as error:
         status = STATUS_OF_EXIT.get(error.exit_status, "failed")
         problems = getattr(error, "problems", None)
         return _unfinished(key, status, problems or [Problem(name, one) for one in error.texts])
     except MemoryError:
-        text = message("batch_no_memory", "more memory was needed than there is")
+        text = message("batch_no_memory", "not enough memory")
         return _unfinished(key, "failed", [Problem(name, text)])
     except OSError as error:
         if error.errno in NO_ROOM:
@@ -153,9 +158,12 @@ def _outcome_of(step, task, clock):
         place = os.path.basename(str(error.filename or "")) or name
         return _unfinished(key, "failed", [Problem(place, reason_of(error))])
     except Exception as error:  # a mistake of tankcal: it must not stop the other jobs
-        text = message("batch_mistake", "a mistake of tankcal, please report it with the job "
-                       "({name}: {error})", name=type(error).__name__,
-                       error=" ".join(str(error).split())[:300])  # fmt: skip
+        text = message(
+            "batch_mistake",
+            "internal error of tankcal; please report it with the job ({name}: {error})",
+            name=type(error).__name__,
+            error=" ".join(str(error).split())[:300],
+        )
         return _unfinished(key, "failed", [Problem(name, text)])
     return StepOutcome(
         key,

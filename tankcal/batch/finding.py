@@ -137,7 +137,7 @@ def _named(argument, wants, log):
     if PATTERN.search(argument) and not os.path.lexists(argument):
         names = sorted(glob.glob(argument, recursive=True))
         if not names:
-            text = message("batch_no_match", "names nothing that there is; expected jobs")
+            text = message("batch_no_match", "no file or folder matches; expected jobs")
             log.problem(argument, text)
         return [one for name in names for one in _in_path(Path(name), wants, log, strict=False)]
     return _in_path(path, wants, log)
@@ -170,11 +170,12 @@ def _nothing_inside(kind):
     if kind == "records":
         return message(
             "batch_no_records",
-            "holds no results; expected folders with record.json, such as those of tankcal run",
+            "contains no results; expected folders with record.json, such as results of tankcal "
+            "run",
         )
     return message(
         "batch_no_jobs",
-        "holds no job; expected job folders with job.toml, or job workbooks (.xlsx)",
+        "contains no job; expected job folders with job.toml, or job workbooks (.xlsx)",
     )
 
 
@@ -258,7 +259,10 @@ def _listed(path, wants, log):
         inside = _in_path(source, wants, log, strict=False) or [Found(source, {})]
         found += [Found(one.source, own) for one in inside]
     if not found and len(log.problems) == told:
-        log.problem(path.name, message("batch_empty_list", "a list without jobs"))
+        log.problem(
+            path.name,
+            message("batch_empty_list", "the list contains no jobs; expected one job per row"),
+        )
     return found
 
 
@@ -276,8 +280,11 @@ def _rows(path, text, log):
         try:
             table.append((row, split_cells(line, mark)))
         except csv.Error as error:
-            log.problem(path.name, message("batch_no_csv", "no CSV ({reason})", reason=str(error)),
-                        row)  # fmt: skip
+            log.problem(
+                path.name,
+                message("batch_no_csv", "not valid CSV ({reason})", reason=str(error)),
+                row,
+            )
             return []
     if not table:
         return []
@@ -286,7 +293,7 @@ def _rows(path, text, log):
     if wrong or HEADINGS[0] not in headings or len(set(headings)) < len(headings):
         text = message(
             "batch_headings",
-            "found the headings {found}; expected job, and maybe {others}, each once",
+            "found the headings {found}; expected job, and optionally {others}, each once",
             found=headings[:10],
             others=[*HEADINGS[1:]],
         )
@@ -300,7 +307,7 @@ def _dicts(path, headings, table, log):
         if not any(cells):
             continue
         if len(cells) > len(headings):
-            text = message("batch_long_row", "{found} cells; expected at most {most}",
+            text = message("batch_long_row", "found {found} cells; expected at most {most}",
                            found=len(cells), most=len(headings))  # fmt: skip
             log.problem(path.name, text, row)
             continue
@@ -338,7 +345,11 @@ def _refuse_doubles(jobs):
     names = Counter(job.name.casefold() for job in jobs)
     double = sorted({job.name for job in jobs if names[job.name.casefold()] > 1})
     if double:
-        text = message("batch_double_names", "two jobs are called {names}", names=double[:5])
+        text = message(
+            "batch_double_names",
+            "two jobs have the name {names}; expected different names",
+            names=double[:5],
+        )
         raise InputError(Problem("JOBS", text))
 
 

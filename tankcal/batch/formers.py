@@ -51,8 +51,8 @@ def former_of(job):
                 return path
     text = message(
         "batch_no_former",
-        "no former table of {name} there; expected {name} with one of the endings {endings}, or a "
-        "folder {name} with record.json",
+        "contains no former table of {name}; expected {name} with one of the endings "
+        "{endings}, or a folder {name} with record.json",
         name=job.label,
         endings=[*ENDINGS],
     )

@@ -135,7 +135,7 @@ def _workers_for(workers, waiting):
 
 def _unsettled(jobs, journal, batch, telling):
     """A `Task` of each job with something left to do; the others are counted as they were."""
-    looking = message("batch_comparing", "looking at what is done already")
+    looking = message("batch_comparing", "checking for finished jobs")
     for number, job in enumerate(jobs):
         telling.part(looking, number, len(jobs))
         task = Task(job, {}, str(journal.out), journal.run)
@@ -245,8 +245,8 @@ class _ByWorkers:
         else:
             text = message(
                 "batch_killer",
-                "its worker ended {count} times while it was computed: out of memory? "
-                "--worker-memory gives more",
+                "its worker ended {count} times during the computation (out of memory? Use a "
+                "larger --worker-memory)",
                 count=TRIES,
             )
             self._tell_ended(task, *fail_job(task, Problem(task.job.name, text)))

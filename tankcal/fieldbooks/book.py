@@ -159,12 +159,14 @@ class FieldBook:
         ):
             return
         if distance is not None and distance < 0:
-            text = message("negative_distance", "found a distance below 0; expected one above it")
+            text = message(
+                "negative_distance", "found a negative distance; expected a positive distance"
+            )
             log.problem(self.file, text, row)
             return
         distance = distance or None  # 0 is how instruments write that none was measured
         if direction is None and zenith is None and distance is None:
-            self.leave_out(message("no_reading", "points without any reading"), row)
+            self.leave_out(message("no_reading", "points without readings"), row)
             return
         zenith = None if zenith is None else zenith % FULL_TURN
         direction = None if direction is None else direction % FULL_TURN
@@ -172,8 +174,8 @@ class FieldBook:
         if face is not None and zenith is not None and face != by_circle:
             text = message(
                 "face_unlike_circle",
-                "found face {face} and a vertical circle of {circle_deg:.4f} degrees; expected one"
-                " of that face: is the circle read from the zenith?",
+                "found face {face} and a vertical circle of {circle_deg:.4f} degrees; expected a "
+                "circle reading of this face (is the circle read from the zenith?)",
                 face=face,
                 circle_deg=zenith,
             )
@@ -194,7 +196,8 @@ def _is_within(log, file, row, value, most, unit):
         return True
     text = message(
         "beyond_reason",
-        "found {value:g} {unit}; expected at most {most:g} {unit}: is the unit that of the file?",
+        "found {value:g} {unit}; expected at most {most:g} {unit} (is the unit of the file "
+        "correct?)",
         value=value,
         most=most,
         unit=unit,
@@ -232,7 +235,8 @@ def refuse_minutes(log, file, row, text):
     """Tell that the minutes or seconds of an angle cannot be."""
     expected = message(
         "impossible_minutes",
-        "found {text!r}; expected degrees, minutes and seconds: is it decimal, or gon?",
+        "found {text!r}; expected degrees, minutes and seconds (is the angle in decimal "
+        "degrees or gon?)",
         text=text[:40],
     )
     log.problem(file, expected, row)

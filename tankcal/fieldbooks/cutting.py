@@ -30,8 +30,8 @@ def tell_cut_numbers(book, log):
         if short:
             text = message(
                 "ways_of_writing",
-                "numbers of {column} with {short} and with {usual:.0f} decimals, each often: read"
-                " as they stand",
+                "numbers of {column} with {short} and with {usual:.0f} decimals, each frequent: "
+                "read as written",
                 column=column,
                 short=", ".join(map(str, short)),
                 usual=usual,
@@ -41,9 +41,9 @@ def tell_cut_numbers(book, log):
             if count <= usual - FEWER and count not in ways and row not in told:
                 expected = message(
                     "cut_short",
-                    "found {text!r} with {count} decimals; expected {usual:.0f}, as {many} of the"
-                    " {all} numbers of this field have at least: cut short? If it is meant, write"
-                    " its zeros",
+                    "found {text!r} with {count} decimals; expected {usual:.0f}: {many} of the "
+                    "{all} numbers of this field have at least that many (truncated? If the "
+                    "number is correct, add its zeros)",
                     text=text[:40],
                     count=count,
                     usual=usual,

@@ -49,7 +49,7 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
         return None
     if found == "csv" and described is None:
         text = message(
-            "profile_needed", "a plain table needs --profile, which says what its columns are"
+            "profile_needed", "a plain table requires --profile with the meaning of its columns"
         )
         log.problem(file, text)
         return None
@@ -75,8 +75,13 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
         book = {"rw5": rw5, "sdr": sdr}[found].read(text, file, log)
     if data.endswith(b"\0") and find_encoding(data) == "utf-8":
         count = len(data) - len(data.rstrip(b"\0"))
-        book.note(message("zeros_at_end", "{count} zero bytes at the end of the file, not read: is"
-                          " its last line complete?", count=count))  # fmt: skip
+        book.note(
+            message(
+                "zeros_at_end",
+                "{count} zero bytes at the end of the file, ignored (is the last line complete?)",
+                count=count,
+            )
+        )
     tell_cut_numbers(book, log)
     return book
 
@@ -103,11 +108,14 @@ def _text(file, data, log):
         row = next((row for row, line in enumerate(lines, 1) if "\0" in line), None)
         if row is None and (any(lines) or "\0" not in text):
             return "\n".join(lines)
-        text = message("binary_file", "a zero byte; expected a text file of an instrument")
+        text = message("binary_file", "contains a zero byte; expected a text file of an instrument")
         log.problem(file, text, row or 1)
         return None
-    text = message("cut_letters", "letters that cannot be read as {encoding}: is the file whole?",
-                   encoding=encoding)  # fmt: skip
+    text = message(
+        "cut_letters",
+        "contains characters that are not {encoding} (is the file complete?)",
+        encoding=encoding,
+    )
     log.problem(file, text)
     return None
 
@@ -120,13 +128,14 @@ def _refusal(text):
         if count and (2 * count >= len(lines) or name == "LandXML"):
             return message(
                 "format_foreign",
-                "a file in the format {name}, which is not read; expected GSI, RW5, JobXML or"
-                " SDR33: export the job in one of them, or as a plain table with --profile",
+                "a file in the format {name}, which tankcal does not read; expected GSI, RW5, "
+                "JobXML or SDR33: export the job in one of these formats, or as a plain table "
+                "with --profile",
                 name=name,
             )
     return message(
         "format_unknown",
-        "not recognised; expected GSI, RW5, JobXML, SDR33, or a plain table with --profile",
+        "unknown format; expected GSI, RW5, JobXML, SDR33, or a plain table with --profile",
     )
 
 

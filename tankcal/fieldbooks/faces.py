@@ -127,9 +127,10 @@ def _mean(first, second, mine, log):
     if any(abs(one) > NO_PAIR_DEG for one in (collimation, index) if one is not None):
         text = message(
             "no_pair_of_faces",
-            "point {point!r}: face 2 is {across_deg:+.4f} degrees across and {up_deg:+.4f} degrees"
-            " up from face 1 (row {row}); expected less than {most:g}: give two points of one name"
-            " different names in the file, or correct the unit of the angles",
+            "point {point!r}: face 2 differs from face 1 (row {row}) by {across_deg:+.4f} "
+            "degrees across and {up_deg:+.4f} degrees up; expected less than {most:g}: if two "
+            "points have one name, change a name in the file; otherwise correct the unit of the "
+            "angles",
             point=first.point,
             across_deg=-2 * (collimation or 0.0),
             up_deg=2 * (index or 0.0),

@@ -75,8 +75,7 @@ def read(text, file, log, custom=UNSAID):
         if words is None:
             expected = message(
                 "no_gsi_line",
-                "not a block of GSI; expected words such as 21.102+07567500, each as long as the"
-                " others",
+                "not a GSI block; expected words of equal length, such as 21.102+07567500",
             )
             log.problem(file, expected, row)
             continue
@@ -157,8 +156,11 @@ def _begin_station(book, log, row, name, word, state):
             return
         height = float(word[1]) / 1000
     if not name.strip("0"):
-        text = message("gsi_station_name", "a code block of a station without word 42; expected"
-                       " the name of the station there")  # fmt: skip
+        text = message(
+            "gsi_station_name",
+            "a code block of a station without word 42; expected the name of the station in word "
+            "42",
+        )
         log.problem(book.file, text, row)
         return
     book.stand(name, height, None, row)
@@ -169,9 +171,9 @@ def _say_codes(book, blocks):
     shown = [one for one, _ in blocks if one][:SHOWN]
     text = message(
         "gsi_codes_not_used",
-        "code blocks (words 41 to 49): {count}, the first in row {row}: {shown}: of which readings"
-        " they are no file says: --codes before or after makes them their codes, --station-code"
-        " the beginning of stations",
+        "code blocks (words 41 to 49): {count}, the first in row {row}: {shown}; GSI does "
+        "not state to which readings they belong: use --codes before or after for codes of "
+        "readings, --station-code for the beginning of stations",
         count=len(blocks),
         row=str(blocks[0][1]),
         shown="; ".join(one[:40] for one in shown) or "-",
@@ -216,12 +218,14 @@ def _known_words(book, log, row, words):
     given = {}
     for index, digits, unit, value in words:
         if digits[0].isdigit() and index not in ("11", "41"):
-            what = message("gsi_level_word", "words {word} of a level", word=index + digits[0])
+            what = message(
+                "gsi_level_word", "words {word} of a digital level", word=index + digits[0]
+            )
             book.leave_out(what, row)
         elif index not in KNOWN:
             book.leave_out(message("gsi_word", "words {word}", word=index), row)
         elif index in given:
-            text = message("gsi_word_twice", "word {word} stands twice in a block", word=index)
+            text = message("gsi_word_twice", "word {word} occurs twice in a block", word=index)
             log.problem(book.file, text, row)
             return None
         else:
@@ -299,7 +303,7 @@ def _take_constants(book, given, state):
         ppm = float(given["59"][1]) / 1e4
     if ppm:
         text = message(
-            "ppm_in_distances", "ppm {ppm:g}: in the distances already, not applied", ppm=ppm
+            "ppm_in_distances", "ppm {ppm:g}: included in the distances, not applied again", ppm=ppm
         )
         book.note(text)
 
@@ -345,8 +349,8 @@ def _take_shot(book, log, row, name, values, code, state):
     elif distance and level and sine and abs(distance * sine - level) > UNLIKE_M:
         text = message(
             "horizontal_unlike_slope",
-            "horizontal distance {level_m:.3f} m, but slope distance and vertical circle make"
-            " {made_m:.3f} m: is the circle read from the zenith, in that unit?",
+            "horizontal distance {level_m:.3f} m, but slope distance and vertical circle give "
+            "{made_m:.3f} m (is the circle read from the zenith, in the unit of the file?)",
             level_m=level,
             made_m=distance * sine,
         )

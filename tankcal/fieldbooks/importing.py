@@ -148,8 +148,7 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
     tables = make_rows(stands, names, stations, chosen, choices)
     check_rows(tables, log)
     if not tables.keys() - {"setups", "control"} and not log.problems:
-        text = message("nothing_read", "no reading that a job can use; expected shots of hits or"
-                       " of targets")  # fmt: skip
+        text = message("nothing_read", "no usable reading; expected readings of hits or targets")
         log.problem(Path(files[0]).name, text)
     log.stop_if_problems()
     found.paths, standing = write_tables(folder, tables, replace=replace_tables)
@@ -166,15 +165,18 @@ def _unused_customs(choices, books):
     given = (("--codes", choices.codes), ("--station-code", choices.station_code))
     for option, value in given:
         if value is not None:
-            text = message("option_of_gsi", "without effect: none of the files is GSI, and other"
-                           " formats say themselves what a code belongs to")  # fmt: skip
+            text = message(
+                "option_of_gsi",
+                "without effect: none of the files is GSI, and other formats state to which "
+                "readings a code belongs",
+            )
             yield Problem(option, text)
 
 
 def _check_times(choices, log):
     begin, end = choices.begin, choices.end
     if end is not None and (begin is None or end <= begin):
-        log.problem("--end", message("end_before_begin", "expected a time after that of --begin"))
+        log.problem("--end", message("end_before_begin", "expected a time later than --begin"))
 
 
 def _read_all(files, choices, log):
@@ -188,7 +190,7 @@ def _read_all(files, choices, log):
     for path in map(Path, files):
         data = read_bytes(path, log, MAX_BYTES)
         if data is not None and data in seen:
-            text = message("file_twice", "the same as {other}; expected each file once",
+            text = message("file_twice", "identical to {other}; expected each file once",
                            other=seen[data])  # fmt: skip
             log.problem(path.name, text)
             continue
@@ -291,16 +293,16 @@ def _control_with_times(chosen, choices, unused, log):
         for shot in without:
             text = message(
                 "control_without_time",
-                "control target {point!r} has no time in the file; expected --begin and --end"
-                " (of a GSI file without a year --begin), or the target with --leave",
+                "control target {point!r} has no time in the file; expected --begin and --end "
+                "(for a GSI file without a year --begin), or --leave for the target",
                 point=shot.point[:40],
             )
             log.problem(shot.file, text, shot.row)
     elif without:
         what = message(
             "again_without_time",
-            "targets read again, without a time in the file: with --begin and --end they become"
-            " control_readings.csv",
+            "targets with repeated readings but without a time in the file; with --begin and "
+            "--end they are written to control_readings.csv",
         )
         unused[what] = without
     kept = tuple(one for one in chosen.control if one.shot.time is not None)
@@ -316,8 +318,8 @@ def _check_ties(chosen, choices, log):
             points = list(dict.fromkeys(one.shot.point for one in chosen.ties))
             text = message(
                 "ties_without_sd",
-                "targets {points} tie set-ups; expected the standard deviation of readings to"
-                " targets: no file of an instrument has it",
+                "targets {points} tie set-ups; expected the standard deviation of readings to "
+                "targets, which instrument files do not contain",
                 points=list_some(points, SHOWN),
             )
             log.problem(key, text)
@@ -335,9 +337,9 @@ def _stations(known, stands, chosen, log):
                 told.add((point, xyz))
                 text = message(
                     "imported_known_twice",
-                    "point {point!r} has other coordinates than in row {row} of {file}; expected"
-                    " one place of each known point: give one of two points another name, delete"
-                    " the coordinates that do not apply, or leave all out with --no-control",
+                    "point {point!r} has different coordinates in row {row} of {file}; expected "
+                    "one position of each known point: rename one of two different points, delete "
+                    "the invalid coordinates, or leave all out with --no-control",
                     point=point[:40],
                     row=str(before[2]),
                     file=before[1],

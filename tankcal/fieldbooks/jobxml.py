@@ -42,16 +42,16 @@ def read(data, file, log, encoding=None):
         parser.Parse(data, True)
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
-        text = message("no_xml", "not sound XML ({reason}): is the file whole?", reason=reason)
+        text = message("no_xml", "not valid XML ({reason}); is the file complete?", reason=reason)
         log.problem(file, text, error.lineno)
     except _Refused:
         return book
     except (ValueError, LookupError):  # an encoding that it declares, and that nobody knows
-        text = message("xml_encoding", "an encoding of XML that is not known; expected UTF-8")
+        text = message("xml_encoding", "unknown XML encoding; expected UTF-8")
         log.problem(file, text, 1)
     taker.tell_strays()
     if not taker.has_field_book and not log.problems:
-        text = message("no_field_book", "no FieldBook in it; expected that of a JobXML file")
+        text = message("no_field_book", "no FieldBook element; expected a JobXML file")
         log.problem(file, text)
     if book.shots:
         book.say_units(length="m", angle="deg")
@@ -82,8 +82,11 @@ class _Taker:
         self.path.append(name)
         self.texts = []
         if len(self.path) > DEEPEST:
-            text = message("xml_deep", "elements within {most} others; expected fewer",
-                           most=DEEPEST)  # fmt: skip
+            text = message(
+                "xml_deep",
+                "elements nested more than {most} deep; expected fewer levels",
+                most=DEEPEST,
+            )
             self.log.problem(self.book.file, text, self.parser.CurrentLineNumber)
             raise _Refused
         self.has_field_book |= name == "FieldBook"
@@ -139,12 +142,15 @@ class _Taker:
                            most=MOST_PPM)  # fmt: skip
             self.log.problem(self.book.file, text, self.row)
         elif ppm and is_raw:
-            self.book.note(message("jxl_ppm_applied", "ppm {ppm:g}: raw distances, applied here",
-                                   ppm=ppm))  # fmt: skip
+            self.book.note(
+                message(
+                    "jxl_ppm_applied", "ppm {ppm:g}: the distances are raw, applied here", ppm=ppm
+                )
+            )
         elif ppm:
             text = message(
                 "jxl_ppm_not_applied",
-                "ppm {ppm:g}: not to be applied, as the file says (ApplyPPMToRawDistances)",
+                "ppm {ppm:g}: not applied, as stated in the file (ApplyPPMToRawDistances)",
                 ppm=ppm,
             )
             self.book.note(text)
@@ -160,7 +166,7 @@ class _Taker:
         elif prism:
             text = message(
                 "jxl_prism_applied",
-                "prism constant {prism_mm:+.1f} mm: raw distances, applied here",
+                "prism constant {prism_mm:+.1f} mm: the distances are raw, applied here",
                 prism_mm=1000 * prism,
             )
             self.book.note(text)
@@ -193,8 +199,10 @@ class _Taker:
         name = self.record.get("Name", "")
         is_shot = any(key.startswith("Circle/") for key in self.record)
         if is_shot and method in MEANS:
-            book.leave_out(message("jxl_means", "means that the controller made of other readings"),
-                           self.row)  # fmt: skip
+            book.leave_out(
+                message("jxl_means", "means computed by the controller from other readings"),
+                self.row,
+            )
         elif is_shot and method in READ:
             self.take_shot(name)
         elif is_shot:
@@ -231,8 +239,8 @@ class _Taker:
         for station, (count, row) in self.strays.items():
             text = message(
                 "jxl_station",
-                "{count} readings of station {station!r}, the first here; expected a StationRecord"
-                " of this ID before them",
+                "{count} readings of station {station!r}, the first in this row; expected a "
+                "StationRecord of this ID before them",
                 count=count,
                 station=station[:40],
             )

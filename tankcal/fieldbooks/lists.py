@@ -153,7 +153,7 @@ def refuse_missing(found):
     for field in found.missing:
         text = message(
             "list_lacks_column",
-            "no heading means {column} ({note}); expected --column 'HEADING={column}', where "
+            "no heading for {column} ({note}); expected --column 'HEADING={column}', where "
             "HEADING is one of {headings}",
             column=field.name,
             note=field.expectation(),

@@ -76,8 +76,12 @@ def read_profile(path, log):
             log.problem(path.name, text, None, f"columns.{key}")
     for key, value in columns.items():
         if not (isinstance(value, str) and value) and not _is_place(value):
-            log.problem(path.name, message("profile_place", "expected a heading or a number from"
-                        " 1"), rows.get(f"columns.{key}"), f"columns.{key}")  # fmt: skip
+            log.problem(
+                path.name,
+                message("profile_place", "expected a heading or a column number from 1"),
+                rows.get(f"columns.{key}"),
+                f"columns.{key}",
+            )
     values = USUAL | content
     _check_values(path.name, values, rows, log)
     return None if len(log.problems) > before else Profile(columns, values)
@@ -114,8 +118,11 @@ def read(text, file, log, profile):
         if headings:
             missing = [one for one in headings.values() if one not in cells]
             for one in missing:
-                expected = message("no_such_heading", "no column {heading!r}; expected it in the"
-                                   " first row", heading=one)  # fmt: skip
+                expected = message(
+                    "no_such_heading",
+                    "no column {heading!r}; expected this heading in the first row",
+                    heading=one,
+                )
                 log.problem(file, expected, row)
             if missing:
                 return book
@@ -137,7 +144,15 @@ def _rows(text, file, separator, log):
         try:
             cells = next(csv.reader([line], delimiter=separator), [])
         except csv.Error:
-            log.problem(file, message("csv_row", "a row that cannot be divided into cells"), row)
+            log.problem(
+                file,
+                message(
+                    "csv_row",
+                    "a row that cannot be split into cells; expected cells with the separator of "
+                    "the profile",
+                ),
+                row,
+            )
             continue
         yield row, [cell.strip() for cell in cells]
 
@@ -157,9 +172,13 @@ def _take(book, log, row, given, values, before):
     face = {"": None, "1": 1, "2": 2, "I": 1, "II": 2}.get(given.get("face", "").upper(), 0)
     time = _time(given.get("time", ""), values)
     if face == 0 or time is False:
-        text = message("csv_face_or_time", "found face {face!r} and time {time!r}; expected face 1"
-                       " or 2, and a time as time_format says", face=given.get("face", "")[:20],
-                       time=given.get("time", "")[:40])  # fmt: skip
+        text = message(
+            "csv_face_or_time",
+            "found face {face!r} and time {time!r}; expected face 1 or 2, and a time in the form "
+            "of time_format",
+            face=given.get("face", "")[:20],
+            time=given.get("time", "")[:40],
+        )
         log.problem(book.file, text, row)
         return before
     scale = METRES[values["length"]]

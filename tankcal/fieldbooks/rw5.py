@@ -142,7 +142,7 @@ def _take_mode(book, log, row, fields, state):
         if value is not None and value != usual:
             text = message(
                 "rw5_correction",
-                "{key} {value:g} of MO: distances are taken as they stand, it is not applied",
+                "{key} {value:g} of MO: not applied, distances are used as written",
                 key=key,
                 value=value,
             )
@@ -183,7 +183,7 @@ def _take_shot(book, log, row, kind, fields, code, state):
         if not state.units_told:
             state.units_told = True
             text = message(
-                "units_unknown", "no units before it; expected a record MO with UN and AU"
+                "units_unknown", "no units before this record; expected a record MO with UN and AU"
             )
             log.problem(book.file, text, row)
         return
@@ -192,7 +192,7 @@ def _take_shot(book, log, row, kind, fields, code, state):
     if "OP" in fields and fields["OP"] != state.station:
         text = message(
             "other_station",
-            "read from {found!r}, but the set-up is over {station!r}; expected the same",
+            "read from {found!r}, but the set-up is over {station!r}; expected the same point",
             found=fields["OP"][:40],
             station=state.station or "",
         )
@@ -234,8 +234,8 @@ def _add(book, log, row, kind, given, code, state, name):
             if state.azimuth is None:
                 text = message(
                     "azimuths_and_angles",
-                    "azimuths and angles from the backsight in one set-up, whose BK has no"
-                    " azimuth; expected one kind, or the azimuth of the backsight",
+                    "azimuths and angles from the backsight in one set-up, whose BK has no "
+                    "azimuth; expected one kind of angle, or the azimuth of the backsight",
                 )
                 log.problem(book.file, text, row)
                 return

@@ -54,11 +54,13 @@ def read(text, file, log):
         if kind == "00":
             _take_header(book, log, row, line, state)
         elif state.length is None:
-            text = message("sdr_header", "no header before it; expected a record 00NM with units")
+            text = message(
+                "sdr_header", "no header before this record; expected a record 00NM with units"
+            )
             log.problem(file, text, row)
             return book
         elif kind == "09" and way == "MC" and derived:
-            book.leave_out(message("means", "means that the instrument made of other readings"),
+            book.leave_out(message("means", "means computed by the instrument from other readings"),
                            row)  # fmt: skip
         else:
             _take(book, log, row, line, state)
@@ -97,7 +99,7 @@ def _take(book, log, row, line, state):
     if kind in takers:
         takers[kind](book, log, row, line, state)
     elif kind == "11":
-        what = message("reduced", "readings that were reduced (azimuth, level distance)")
+        what = message("reduced", "reduced readings (azimuth, horizontal distance)")
         book.leave_out(what, row)
     elif kind not in OTHERS:
         book.leave_out(message("sdr_records", "records {kind}", kind=kind + way), row)
@@ -156,8 +158,7 @@ def _numbers(book, log, row, texts, scale):
     if bad:
         text = message(
             "sdr_number",
-            "found {text!r}; expected a number: is this the width of the fields that the header"
-            " says?",
+            "found {text!r}; expected a number (do the field widths agree with the header?)",
             text=bad[0],
         )
         log.problem(book.file, text, row)
@@ -172,7 +173,7 @@ def _coordinates(values, state):
 
 def _take_point(book, log, row, line, state):
     if line[2:4] != "KI":
-        book.leave_out(message("computed_points", "coordinates that were computed of readings"),
+        book.leave_out(message("computed_points", "coordinates computed from readings"),
                        row)  # fmt: skip
         return
     parts = _fields(line, state, 1, 3)
@@ -193,7 +194,8 @@ def _take_shot(book, log, row, line, state):
     if plain_name(station) != book.setups[-1].station:
         text = message(
             "sdr_station",
-            "read from {found!r}, but the last record 02 is of {station!r}; expected the same",
+            "read from {found!r}, but the last record 02 is of {station!r}; expected the same "
+            "point",
             found=station,
             station=book.setups[-1].station,
         )

@@ -103,7 +103,7 @@ def _targets(control, others, of_hits, choices, known, leave_out):
         if not is_tie and not is_again:
             what = message(
                 "ties_nothing",
-                "targets that tie nothing: read once, and from one set-up, or the only one",
+                "targets that tie no set-ups: read once, from one set-up or from the only set-up",
             )
             leave_out(what, one)
     return tuple(again), tuple(ties)
@@ -114,8 +114,8 @@ def _refuse_without_hits(readings, choices, log):
     shown = [*names[:SHOWN], *(["..."] if len(names) > SHOWN else [])]
     text = message(
         "which_are_hits",
-        "none of the points {names} is called a hit; expected --hits with their names or codes,"
-        " such as --hits '1-200' or --hits 'W*', or --no-hits",
+        "none of the points {names} is identified as a hit; expected --hits with names or "
+        "codes, such as --hits '1-200' or --hits 'W*', or --no-hits",
         names=", ".join(shown) or "-",
     )
     log.problem("--hits", text)

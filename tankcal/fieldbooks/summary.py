@@ -33,8 +33,8 @@ def summarise(books, chosen, unused, names, stands, reports, coordinates, standi
         lines.append(
             message(
                 "import_known",
-                "points with coordinates: {count}; in control.csv, without standard deviations:"
-                " {names}",
+                "points with coordinates: {count}; written to control.csv, without standard "
+                "deviations: {names}",
                 count=len(known),
                 names=list_some(list(stations), SHOWN) or ["-"],
             )
@@ -54,7 +54,7 @@ def summarise(books, chosen, unused, names, stands, reports, coordinates, standi
         lines.append(
             message(
                 "import_standing",
-                "{tables}: left as they are, nothing in the files is for them",
+                "{tables}: unchanged, the files contain no data for them",
                 tables=tables,
             )
         )
@@ -73,8 +73,8 @@ def _of_book(book):
         constants = sorted({one.prism_mm for one in book.shots if one.prism_mm is not None})
         yield message(
             "import_applied",
-            "{file}: distances as the instrument wrote them, with its prism constant ({constants})"
-            " and ppm in them: nothing is applied again",
+            "{file}: distances as written by the instrument, including its prism constant "
+            "({constants}) and ppm: no correction is applied again",
             file=book.file,
             constants=[f"{one:+g} mm" for one in constants] or ["-"],
         )
@@ -87,15 +87,18 @@ def _of_book(book):
                 yield message("import_rejected", "{file}: {what}, not used: {count}, the first in"
                               " row {row}", **values)  # fmt: skip
             else:
-                yield message("import_left_out", "{file}: not understood, so left out: {what}:"
-                              " {count}, the first in row {row}", **values)  # fmt: skip
+                yield message(
+                    "import_left_out",
+                    "{file}: not recognised and left out: {what}: {count}, the first in row {row}",
+                    **values,
+                )
 
 
 def _of_faces(setup, report):
     yield message(
         "import_faces",
-        "set-up {setup}: {pairs} points on both faces (their mean is taken), {first} on face 1"
-        " alone, {second} on face 2 alone",
+        "set-up {setup}: {pairs} points on both faces (averaged), {first} on face 1 only, "
+        "{second} on face 2 only",
         setup=setup,
         pairs=report.pairs,
         first=report.single[0],
@@ -104,9 +107,9 @@ def _of_faces(setup, report):
     if report.collimation is not None and report.index is not None:
         yield message(
             "import_collimation",
-            "set-up {setup}: collimation {c_arcsec:+.1f} arcsec (none further than"
-            " {c_spread:.1f}), index error {i_arcsec:+.1f} arcsec (none further than"
-            " {i_spread:.1f}), both distances within {apart_mm:.1f} mm",
+            "set-up {setup}: collimation {c_arcsec:+.1f} arcsec (largest deviation "
+            "{c_spread:.1f}), index error {i_arcsec:+.1f} arcsec (largest deviation "
+            "{i_spread:.1f}), distances of the two faces within {apart_mm:.1f} mm",
             setup=setup,
             c_arcsec=ARCSEC * report.collimation[0],
             c_spread=ARCSEC * report.collimation[1],
@@ -117,8 +120,8 @@ def _of_faces(setup, report):
     if sum(report.single) and (report.collimation or report.index):
         yield message(
             "import_freed",
-            "set-up {setup}: the collimation and index errors of its pairs are removed from its"
-            " {count} readings on one face alone",
+            "set-up {setup}: {count} readings on one face corrected by the mean collimation and "
+            "index errors of the pairs",
             setup=setup,
             count=sum(report.single),
         )
@@ -141,19 +144,28 @@ def warn_of(chosen, names, stands, reports):
     for place, name in names.items():
         stand, file = stands[place]
         if not stand.is_told and stand.height_m is not None:
-            text = message("station_of_readings", "set-up {setup}: no record of a station in the"
-                           " file, only the height of the instrument: its point is named by the"
-                           " readings or not at all, and a second stand that the file does not"
-                           " name would not show; look at setups.csv", setup=name)  # fmt: skip
+            text = message(
+                "station_of_readings",
+                "set-up {setup}: the file has no station record, only an instrument height; the "
+                "station is named by the readings or unknown, and a second station without a "
+                "record is not detected; check setups.csv",
+                setup=name,
+            )
             found.append(Problem(file, text, stand.row))
         elif not stand.is_told:
-            text = message("no_station", "set-up {setup}: no station in the file, so its point and"
-                           " the height of the instrument are unknown: fill them into setups.csv"
-                           " before you run the job", setup=name)  # fmt: skip
+            text = message(
+                "no_station",
+                "set-up {setup}: the file has no station, so the station name and the instrument "
+                "height are unknown; enter them in setups.csv before you run the job",
+                setup=name,
+            )
             found.append(Problem(file, text, stand.row))
         elif stand.height_m is None:
-            text = message("no_instrument_height", "set-up {setup}: no height of the instrument in"
-                           " the file: it is left blank (0)", setup=name)  # fmt: skip
+            text = message(
+                "no_instrument_height",
+                "set-up {setup}: the file has no instrument height; it is left blank (0)",
+                setup=name,
+            )
             found.append(Problem(file, text, stand.row))
     for report in (one for one in reports if one.setup in names):
         name, file = names[report.setup], stands[report.setup][1]
@@ -161,9 +173,9 @@ def warn_of(chosen, names, stands, reports):
             if what is not None and max(abs(what[0]), what[1]) > LARGE_DEG:
                 text = message(
                     "instrument_to_adjust",
-                    "set-up {setup}: the two faces differ by an error of {size:.0f} arcsec, over"
-                    " {limit:.0f}: is the instrument adjusted? Points on one face alone are freed"
-                    " of its mean only",
+                    "set-up {setup}: the two faces differ by an error of {size:.0f} arcsec, above "
+                    "the limit of {limit:.0f} (is the instrument adjusted?); readings on one face "
+                    "are corrected by the mean error only",
                     setup=name,
                     size=ARCSEC * max(abs(what[0]), what[1]),
                     limit=ARCSEC * LARGE_DEG,
@@ -173,8 +185,8 @@ def warn_of(chosen, names, stands, reports):
         if report.apart_m > LARGE_M:
             text = message(
                 "distances_apart",
-                "set-up {setup}: distances of both faces differ by {apart_mm:.1f} mm, over"
-                " {limit_mm:.0f}",
+                "set-up {setup}: distances of the two faces differ by {apart_mm:.1f} mm, above the "
+                "limit of {limit_mm:.0f}",
                 setup=name,
                 apart_mm=1000 * report.apart_m,
                 limit_mm=1000 * LARGE_M,
@@ -184,7 +196,7 @@ def warn_of(chosen, names, stands, reports):
         shot = chosen.hits[0].shot
         text = message(
             "more_hits_than_a_job_takes",
-            "{count} hits, and a job takes at most {most}: leave some out with --leave",
+            "{count} hits, but a job allows at most {most}; leave some out with --leave",
             count=len(chosen.hits),
             most=MOST_HITS,
         )
@@ -193,8 +205,9 @@ def warn_of(chosen, names, stands, reports):
     if chosen.ties:
         text = message(
             "frame_not_held",
-            "targets tie set-ups, and no file has standard deviations of coordinates: give those of"
-            " known points here, or [adjustment] datum = 'minimal' in job.toml",
+            "targets tie set-ups, but no file has standard deviations of coordinates; enter the "
+            "standard deviations of known points here, or set [adjustment] datum = 'minimal' in "
+            "job.toml",
         )
         found.append(Problem("control.csv", text))
     return found
@@ -212,8 +225,8 @@ def _of_constants(chosen):
     elif hits - {0.0} and hits == targets:
         text = message(
             "constant_of_prism",
-            "hits of the bare wall with the prism constant of the targets, {constant:+g} mm: was"
-            " the instrument set to ranging without reflector?",
+            "hits without reflector have the prism constant of the targets, {constant:+g} mm "
+            "(was the instrument set to reflectorless measurement?)",
             constant=next(iter(hits)),
         )
         yield Problem(first.file, text, first.row)

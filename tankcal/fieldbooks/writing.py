@@ -45,7 +45,7 @@ def refuse_standing(folder, names):
     for name in names:
         text = message(
             "table_stands",
-            "has rows already, and is left as it is; expected an empty table, or --replace",
+            "already contains rows and is left unchanged; expected an empty table, or --replace",
         )
         log.problem(f"{name}.csv", text)
     log.stop_if_problems()
