@@ -713,7 +713,7 @@ def test_summary_states_the_quality(job, only, capsys, monkeypatch):
     assert main(["run", str(job), "--only", "adjustment", "--strict"]) == 0
     out = capsys.readouterr().out
     assert out.startswith("adjustment: sigma0 = ")
-    for words in ("global test passed", "3 observations rejected", "48 points", "mean standard deviation 1."):
+    for words in ("global test passed", "3 observations rejected", "48 points", "deviation 1."):
         assert words in out
 
 
