@@ -30,7 +30,7 @@ def add(commands):
         help="compute many jobs, on all cores or a cluster",
         description="Carry out the chosen steps (run, report, compare, inspect, export) for each "
         "of many jobs. The results of each job are in its folder under DIR/jobs; summary.html, "
-        "summary.xlsx, summary.csv and summary.json summarize all jobs. The same command again "
+        "summary.xlsx, summary.csv and summary.json summarise all jobs. The same command again "
         "computes new and changed jobs only, and continues a batch that was interrupted. See "
         "docs/batch.md.",
         epilog="exit status: 0 all jobs done; 2 some jobs were refused or failed (one line each), "

@@ -159,9 +159,9 @@ def _convert(kinds):
     one = kinds.add_parser(
         "convert",
         help="convert cameras from and to other programs",
-        description="Convert cameras between OpenCV, COLMAP, Metashape, Pix4D, AICON, "
-        "cameras.toml and record.json. If the camera models differ, the largest difference within "
-        "the frame is printed.",
+        description="Convert cameras between OpenCV, COLMAP, Metashape, Pix4D, AICON and "
+        "cameras.toml; a record.json can also be read. If the camera models differ, the largest "
+        "difference within the frame is printed.",
     )
     one.add_argument("file", metavar="FILE")
     one.add_argument(
