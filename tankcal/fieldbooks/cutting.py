@@ -18,15 +18,15 @@ OFTEN, SHARE = 3, 0.1  # so many numbers, and that part of a field, are a way of
 
 def tell_cut_numbers(book, log):
     """Tell each number of a book that its reader handed to `FieldBook.keep_text`."""
-    told = {one.row for one in log.problems if one.file == book.file}
+    reported_rows = {problem.row for problem in log.problems if problem.file == book.file}
     for column, texts in book.texts.items():
         decimals = [_decimals(text) for text, _ in texts]
         usual = median(decimals)
         if usual < FEWER or _is_without_zeros(texts, decimals, usual):
             continue
         counts = Counter(decimals)
-        ways = {one for one, times in counts.items() if times >= max(OFTEN, SHARE * len(texts))}
-        short = [one for one in sorted(ways) if one <= usual - FEWER]
+        ways = {count for count, times in counts.items() if times >= max(OFTEN, SHARE * len(texts))}
+        short = [count for count in sorted(ways) if count <= usual - FEWER]
         if short:
             text = message(
                 "ways_of_writing",
@@ -38,7 +38,7 @@ def tell_cut_numbers(book, log):
             )
             book.note(text)
         for (text, row), count in zip(texts, decimals, strict=True):
-            if count <= usual - FEWER and count not in ways and row not in told:
+            if count <= usual - FEWER and count not in ways and row not in reported_rows:
                 expected = message(
                     "cut_short",
                     "found {text!r} with {count} decimals; expected {usual:.0f}: {many} of the "
@@ -47,7 +47,7 @@ def tell_cut_numbers(book, log):
                     text=text[:40],
                     count=count,
                     usual=usual,
-                    many=sum(one >= usual for one in decimals),
+                    many=sum(number >= usual for number in decimals),
                     all=len(texts),
                 )
                 log.problem(book.file, expected, row, column)
@@ -56,7 +56,7 @@ def tell_cut_numbers(book, log):
 def _decimals(text):
     """How many digits stand behind the last mark of decimals."""
     _, mark, behind = text.replace(",", ".").rpartition(".")
-    return sum(one.isdigit() for one in behind) if mark else 0
+    return sum(character.isdigit() for character in behind) if mark else 0
 
 
 def _is_without_zeros(texts, decimals, usual):

@@ -43,17 +43,17 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
     text = _text(file, data, log)
     if text is None:
         return None
-    found = wanted or _format_of(text, described)
-    if found is None:
+    format_name = wanted or _format_of(text, described)
+    if format_name is None:
         log.problem(file, _refusal(text))
         return None
-    if found == "csv" and described is None:
+    if format_name == "csv" and described is None:
         text = message(
             "profile_needed", "a plain table requires --profile with the meaning of its columns"
         )
         log.problem(file, text)
         return None
-    if found == "jxl":
+    if format_name == "jxl":
         is_plain = find_encoding(data) == "utf-8"  # the bytes of letters in UTF-16 can be controls
         if is_plain:
             return jobxml.read(data.strip(_AROUND_BYTES + b"\r\n\t "), file, log)
@@ -62,17 +62,17 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
     if has_too_many_lines(file, text, log, MAX_LINES):  # JobXML has many lines for each reading
         return None
     for row, line in enumerate(text.split("\n"), 1):
-        if len(line) > MAX_LINE and not (found == "gsi" and gsi.LINE.match(line)):
+        if len(line) > MAX_LINE and not (format_name == "gsi" and gsi.LINE.match(line)):
             expected = message("line_too_long", "a line of more than {most} characters; expected a"
                                " field book", most=MAX_LINE)  # fmt: skip
             log.problem(file, expected, row)
             return None
-    if found == "csv":
+    if format_name == "csv":
         book = profile.read(text, file, log, described)
-    elif found == "gsi":
+    elif format_name == "gsi":
         book = gsi.read(text, file, log, custom)
     else:
-        book = {"rw5": rw5, "sdr": sdr}[found].read(text, file, log)
+        book = {"rw5": rw5, "sdr": sdr}[format_name].read(text, file, log)
     if data.endswith(b"\0") and find_encoding(data) == "utf-8":
         count = len(data) - len(data.rstrip(b"\0"))
         book.note(

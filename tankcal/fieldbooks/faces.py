@@ -62,19 +62,21 @@ def reduce_faces(shots, log):
             stack.append(place)
     readings, errors, seconds = [], {}, set(mates.values())
     for place, shot in enumerate(shots):
-        mine = errors.setdefault(shot.setup, {"pairs": [], "1": 0, "2": 0, "apart": 0.0})
+        tally = errors.setdefault(shot.setup, {"pairs": [], "1": 0, "2": 0, "apart": 0.0})
         if place in seconds:
             continue
         if place in mates:
-            pair = sorted((shot, shots[mates[place]]), key=lambda one: one.face)
-            found = _mean(*pair, mine, log)
-            if found is not None:
-                readings.append(Reading(replace(found, row=shot.row, time=shot.time), "both"))
+            pair = sorted((shot, shots[mates[place]]), key=lambda member: member.face)
+            mean = _mean(*pair, tally, log)
+            if mean is not None:
+                readings.append(Reading(replace(mean, row=shot.row, time=shot.time), "both"))
         else:
-            mine[str(shot.face)] += 1
+            tally[str(shot.face)] += 1
             readings.append(Reading(_on_face_1(shot), str(shot.face)))
-    reports = {setup: _report(setup, one) for setup, one in errors.items()}
-    return [_freed(one, reports[one.shot.setup]) for one in readings], [*reports.values()]
+    reports = {setup: _report(setup, tally) for setup, tally in errors.items()}
+    return [_freed(reading, reports[reading.shot.setup]) for reading in readings], [
+        *reports.values()
+    ]
 
 
 def _freed(reading, report):
@@ -111,20 +113,20 @@ def _turned(direction):
     return (direction + HALF_TURN) % FULL_TURN
 
 
-def _mean(first, second, mine, log):
+def _mean(first, second, tally, log):
     """The mean of a pair on face 1; None after telling that they are none."""
-    turned, found = _on_face_1(second), {}
+    turned, means = _on_face_1(second), {}
     sine = 1.0
     collimation = index = None
     if None not in (first.zenith_deg, turned.zenith_deg):
         index = (first.zenith_deg - turned.zenith_deg) / 2
-        found["zenith_deg"] = first.zenith_deg - index
-        sine = _sine(found["zenith_deg"])
+        means["zenith_deg"] = first.zenith_deg - index
+        sine = _sine(means["zenith_deg"])
     if None not in (first.direction_deg, turned.direction_deg):
         apart = (first.direction_deg - turned.direction_deg + HALF_TURN) % FULL_TURN - HALF_TURN
         collimation = apart / 2 * sine
-        found["direction_deg"] = (first.direction_deg - apart / 2) % FULL_TURN
-    if any(abs(one) > NO_PAIR_DEG for one in (collimation, index) if one is not None):
+        means["direction_deg"] = (first.direction_deg - apart / 2) % FULL_TURN
+    if any(abs(error) > NO_PAIR_DEG for error in (collimation, index) if error is not None):
         text = message(
             "no_pair_of_faces",
             "point {point!r}: face 2 differs from face 1 (row {row}) by {across_deg:+.4f} "
@@ -139,24 +141,28 @@ def _mean(first, second, mine, log):
         )
         log.problem(second.file, text, second.row)
         return None
-    mine["pairs"].append((collimation, index))
+    tally["pairs"].append((collimation, index))
     if None not in (first.distance_m, turned.distance_m):
-        found["distance_m"] = (first.distance_m + turned.distance_m) / 2
-        mine["apart"] = max(mine["apart"], abs(first.distance_m - turned.distance_m))
-    one = {key: getattr(first, key) for key in ("direction_deg", "zenith_deg", "distance_m")}
-    other = {key: getattr(turned, key) for key in one}
-    merged = {key: other[key] if value is None else value for key, value in one.items()}
-    return replace(first, **(merged | found))
+        means["distance_m"] = (first.distance_m + turned.distance_m) / 2
+        tally["apart"] = max(tally["apart"], abs(first.distance_m - turned.distance_m))
+    first_values = {
+        key: getattr(first, key) for key in ("direction_deg", "zenith_deg", "distance_m")
+    }
+    second_values = {key: getattr(turned, key) for key in first_values}
+    merged = {
+        key: second_values[key] if value is None else value for key, value in first_values.items()
+    }
+    return replace(first, **(merged | means))
 
 
-def _report(setup, mine):
+def _report(setup, tally):
     return FaceReport(
         setup,
-        len(mine["pairs"]),
-        (mine["1"], mine["2"]),
-        _spread([one for one, _ in mine["pairs"] if one is not None]),
-        _spread([one for _, one in mine["pairs"] if one is not None]),
-        mine["apart"],
+        len(tally["pairs"]),
+        (tally["1"], tally["2"]),
+        _spread([collimation for collimation, _ in tally["pairs"] if collimation is not None]),
+        _spread([index for _, index in tally["pairs"] if index is not None]),
+        tally["apart"],
     )
 
 
@@ -164,4 +170,4 @@ def _spread(values):
     if not values:
         return None
     mean = sum(values) / len(values)
-    return mean, max(abs(one - mean) for one in values)
+    return mean, max(abs(value - mean) for value in values)

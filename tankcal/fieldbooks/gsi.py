@@ -107,34 +107,39 @@ def _words(line):
     body = line.lstrip("*")
     step = 7 + width + 1
     parts = [body[start : start + step] for start in range(0, len(body), step)]
-    parts = [one if one[step - 1 :].strip() else one[: step - 1] for one in parts if one.strip()]
-    if not all(len(one) == 7 + width and _WORD.fullmatch(one) for one in parts):
-        parts = [one.lstrip("*") for one in body.split()]
-        if not all(len(one) == 7 + width and _WORD.fullmatch(one) for one in parts):
+    parts = [
+        part if part[step - 1 :].strip() else part[: step - 1] for part in parts if part.strip()
+    ]
+    if not all(len(part) == 7 + width and _WORD.fullmatch(part) for part in parts):
+        parts = [part.lstrip("*") for part in body.split()]
+        if not all(len(part) == 7 + width and _WORD.fullmatch(part) for part in parts):
             return None
-    matches = [_WORD.fullmatch(one) for one in parts]
-    return [(one[1], one[2] + one[3] + one[4], one[5], one[6] + one[7]) for one in matches] or None
+    matches = [_WORD.fullmatch(part) for part in parts]
+    return [
+        (match[1], match[2] + match[3] + match[4], match[5], match[6] + match[7])
+        for match in matches
+    ] or None
 
 
 def _blocks(words):
     """The blocks of a line: some programs write several, each begins with its number."""
-    found = [[words[0]]]
-    for one in words[1:]:
-        if one[0] in ("11", "41") and (one[1] + one[2]).isdigit():
-            found.append([])
-        found[-1].append(one)
-    return found
+    blocks = [[words[0]]]
+    for word in words[1:]:
+        if word[0] in ("11", "41") and (word[1] + word[2]).isdigit():
+            blocks.append([])
+        blocks[-1].append(word)
+    return blocks
 
 
 def _take_code(book, log, row, words, state, custom):
     """A code block: a station, the code of readings, or told as it stands."""
-    given = _known_words(book, log, row, words)
-    if given is None:
+    values = _known_words(book, log, row, words)
+    if values is None:
         return
-    texts = [_text(given[one]) if one in given else "" for one in CODES]
-    code = " ".join(one for one in texts if one.strip("0"))
+    texts = [_text(values[index]) if index in values else "" for index in CODES]
+    code = " ".join(text for text in texts if text.strip("0"))
     if custom.station is not None and texts[0].upper() == plain_name(custom.station).upper():
-        _begin_station(book, log, row, texts[1], given.get("43"), state)
+        _begin_station(book, log, row, texts[1], values.get("43"), state)
     elif custom.codes == "before":
         state.code = code
     elif custom.codes == "after":
@@ -168,7 +173,7 @@ def _begin_station(book, log, row, name, word, state):
 
 
 def _say_codes(book, blocks):
-    shown = [one for one, _ in blocks if one][:SHOWN]
+    shown = [code for code, _ in blocks if code][:SHOWN]
     text = message(
         "gsi_codes_not_used",
         "code blocks (words 41 to 49): {count}, the first in row {row}: {shown}; GSI does "
@@ -176,46 +181,54 @@ def _say_codes(book, blocks):
         "readings, --station-code for the beginning of stations",
         count=len(blocks),
         row=str(blocks[0][1]),
-        shown="; ".join(one[:40] for one in shown) or "-",
+        shown="; ".join(code[:40] for code in shown) or "-",
     )
     book.note(text)
 
 
 def _take(book, log, row, words, state):
-    given = _known_words(book, log, row, words)
-    if given is None:
+    words_by_index = _known_words(book, log, row, words)
+    if words_by_index is None:
         return
     values = {}
-    for index in given:
-        if (index in ("21", "22") or index in LENGTH_WORDS) and _has_value(given[index]):
-            values[index] = _value(book, log, row, index, *given[index])
+    for index in words_by_index:
+        if (index in ("21", "22") or index in LENGTH_WORDS) and _has_value(words_by_index[index]):
+            values[index] = _value(book, log, row, index, *words_by_index[index])
             if values[index] is None:
                 return
-    _take_times(given, state)
-    _take_constants(book, given, state)
-    if "12" in given or "13" in given:
-        named = [_text(given[one]) for one in ("13", "12") if one in given]
-        book.instrument = " ".join(one for one in named if not FILLER.fullmatch(one))
-    name = _text(given["11"]) if "11" in given else ""
+    _take_times(words_by_index, state)
+    _take_constants(book, words_by_index, state)
+    if "12" in words_by_index or "13" in words_by_index:
+        named = [_text(words_by_index[index]) for index in ("13", "12") if index in words_by_index]
+        book.instrument = " ".join(
+            name_part for name_part in named if not FILLER.fullmatch(name_part)
+        )
+    name = _text(words_by_index["11"]) if "11" in words_by_index else ""
     name = "" if FILLER.fullmatch(name) else name
     is_reading = any(index in values for index in ("21", "22", "31", "32"))
     _take_station(book, row, name, values, is_reading, state)
-    if "87" in given:  # without a value, the height of the target before does not hold either
+    if (
+        "87" in words_by_index
+    ):  # without a value, the height of the target before does not hold either
         state.height = values.get("87")
     if is_reading:
-        texts = [_text(given[one]) for one in (*TEXTS[1:], *CODES) if one in given]
-        code = " ".join(one for one in texts if not FILLER.fullmatch(one))
+        texts = [
+            _text(words_by_index[index])
+            for index in (*TEXTS[1:], *CODES)
+            if index in words_by_index
+        ]
+        code = " ".join(text for text in texts if not FILLER.fullmatch(text))
         _take_shot(book, log, row, name, values, code or state.code, state)
-    elif all(one in values for one in OF_TARGET[:2]):
-        xyz = tuple(values.get(one) for one in OF_TARGET)
+    elif all(index in values for index in OF_TARGET[:2]):
+        xyz = tuple(values.get(index) for index in OF_TARGET)
         book.known.append(KnownPoint(name, xyz, row))
-    elif not any(one in values for one in (*OF_STATION, "87", "88")):
+    elif not any(index in values for index in (*OF_STATION, "87", "88")):
         book.leave_out(message("gsi_without_reading", "blocks without a reading"), row)
 
 
 def _known_words(book, log, row, words):
     """{index: (unit, signed value)} of the words that are read; None: one stands twice (told)."""
-    given = {}
+    words_by_index = {}
     for index, digits, unit, value in words:
         if digits[0].isdigit() and index not in ("11", "41"):
             what = message(
@@ -224,13 +237,13 @@ def _known_words(book, log, row, words):
             book.leave_out(what, row)
         elif index not in KNOWN:
             book.leave_out(message("gsi_word", "words {word}", word=index), row)
-        elif index in given:
+        elif index in words_by_index:
             text = message("gsi_word_twice", "word {word} occurs twice in a block", word=index)
             log.problem(book.file, text, row)
             return None
         else:
-            given[index] = unit, value
-    return given
+            words_by_index[index] = unit, value
+    return words_by_index
 
 
 def _text(word):
@@ -277,9 +290,11 @@ def _say_length(book, name, parts):
     book.say_units(length=name, last=last)
 
 
-def _take_times(given, state):
+def _take_times(words_by_index, state):
     """Words 17 (day, month, year: ddmmyyyy) and 19 (month, day, hour, minute)."""
-    date, clock = (given[one][1][-8:] if one in given else "" for one in ("17", "19"))
+    date, clock = (
+        words_by_index[index][1][-8:] if index in words_by_index else "" for index in ("17", "19")
+    )
     if date.isdigit() and EARLIEST <= int(date[-4:]) <= LATEST:
         state.year = int(date[-4:])
     if clock.isdigit():
@@ -290,17 +305,17 @@ def _take_times(given, state):
             state.time = None
 
 
-def _take_constants(book, given, state):
+def _take_constants(book, words_by_index, state):
     """Prism constant and ppm: only said, for the instrument applied them."""
     ppm = None
-    if "51" in given:
-        both = _TWO_VALUES.fullmatch(given["51"][1])
+    if "51" in words_by_index:
+        both = _TWO_VALUES.fullmatch(words_by_index["51"][1])
         if both:
             ppm, state.prism = float(both[1]), float(both[2])
-    if "58" in given and given["58"][1][1:].isdigit():
-        state.prism = float(given["58"][1]) / (10 if given["58"][0] == "6" else 1)
-    if "59" in given and given["59"][1][1:].isdigit():
-        ppm = float(given["59"][1]) / 1e4
+    if "58" in words_by_index and words_by_index["58"][1][1:].isdigit():
+        state.prism = float(words_by_index["58"][1]) / (10 if words_by_index["58"][0] == "6" else 1)
+    if "59" in words_by_index and words_by_index["59"][1][1:].isdigit():
+        ppm = float(words_by_index["59"][1]) / 1e4
     if ppm:
         text = message(
             "ppm_in_distances", "ppm {ppm:g}: included in the distances, not applied again", ppm=ppm
@@ -310,7 +325,7 @@ def _take_constants(book, given, state):
 
 def _take_station(book, row, name, values, is_reading, state):
     """Begin a set-up where name, coordinates or height of the station change."""
-    xyz = tuple(values.get(one) for one in OF_STATION)
+    xyz = tuple(values.get(index) for index in OF_STATION)
     xyz, height = None if None in xyz[:2] else xyz, values.get("88")
     if xyz is None and height is None:
         return
@@ -342,7 +357,7 @@ def _are_same(first, second):
 
 
 def _take_shot(book, log, row, name, values, code, state):
-    zenith, distance, level = (values.get(one) for one in ("22", "31", "32"))
+    zenith, distance, level = (values.get(index) for index in ("22", "31", "32"))
     sine = None if zenith is None else abs(math.sin(math.radians(zenith)))
     if distance is None and level and sine:
         distance = level / sine

@@ -120,7 +120,7 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
     >>> print(found.summary[4])
     hits of the wall: 200
     """
-    log, found = Log(), Imported()
+    log, result = Log(), Imported()
     _check_times(choices, log)
     books = _read_all(files, choices, log)
     log.stop_if_problems()
@@ -128,22 +128,22 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
     shots = _with_times(shots, choices)
     readings, reports = reduce_faces(shots, log)
     log.stop_if_problems()
-    places = sorted({one.setup for one in shots})
+    places = sorted({shot.setup for shot in shots})
     names = _names_of_setups(stands, places)
     known = _known_points(books, stands, places, names, log)
-    stands = {place: (replace(one, station=_station(one, names[place])), file)
-              for place, (one, file) in enumerate(stands) if place in names}  # fmt: skip
+    stands = {place: (replace(stand, station=_station(stand, names[place])), file)
+              for place, (stand, file) in enumerate(stands) if place in names}  # fmt: skip
     unused = {}
     chosen = sort_readings(
-        readings, choices, {*known, *(one.station for one, _ in stands.values())}, log,
-        lambda what, one: unused.setdefault(what, []).append(one.shot),
+        readings, choices, {*known, *(stand.station for stand, _ in stands.values())}, log,
+        lambda what, reading: unused.setdefault(what, []).append(reading.shot),
     )  # fmt: skip
     _tell_empty_setups(books)
     chosen = _control_with_times(chosen, choices, unused, log)
     _check_ties(chosen, choices, log)
     log.stop_if_problems()
     stations = {} if choices.no_control else _stations(known, stands, chosen, log)
-    used = {one.shot.setup for one in (*chosen.hits, *chosen.control, *chosen.ties)}
+    used = {reading.shot.setup for reading in (*chosen.hits, *chosen.control, *chosen.ties)}
     names = {place: name for place, name in names.items() if place in used}
     tables = make_rows(stands, names, stations, chosen, choices)
     check_rows(tables, log)
@@ -151,19 +151,19 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
         text = message("nothing_read", "no usable reading; expected readings of hits or targets")
         log.problem(Path(files[0]).name, text)
     log.stop_if_problems()
-    found.paths, standing = write_tables(folder, tables, replace=replace_tables)
-    found.summary = summarise(books, chosen, unused, names, stands, reports, (known, stations),
+    result.paths, standing = write_tables(folder, tables, replace=replace_tables)
+    result.summary = summarise(books, chosen, unused, names, stands, reports, (known, stations),
                               standing)  # fmt: skip
-    found.warnings = [*_unused_customs(choices, books), *warn_of(chosen, names, stands, reports)]
-    return found
+    result.warnings = [*_unused_customs(choices, books), *warn_of(chosen, names, stands, reports)]
+    return result
 
 
 def _unused_customs(choices, books):
     """Choices about code blocks that no file has, for none is GSI."""
     if any(book.format == "gsi" for book in books):
         return
-    given = (("--codes", choices.codes), ("--station-code", choices.station_code))
-    for option, value in given:
+    options = (("--codes", choices.codes), ("--station-code", choices.station_code))
+    for option, value in options:
         if value is not None:
             text = message(
                 "option_of_gsi",
@@ -206,14 +206,14 @@ def _joined(books):
     """([(SetUp, file)], shots) of all books, the places of set-ups counted on."""
     stands, shots = [], []
     for book in books:
-        shots += [replace(one, setup=one.setup + len(stands)) for one in book.shots]
-        stands += [(one, book.file) for one in book.setups]
+        shots += [replace(shot, setup=shot.setup + len(stands)) for shot in book.shots]
+        stands += [(setup, book.file) for setup in book.setups]
     return stands, shots
 
 
 def _tell_empty_setups(books):
     for book in books:
-        used = {one.setup for one in book.shots}
+        used = {shot.setup for shot in book.shots}
         for place, stand in enumerate(book.setups):
             if place not in used:
                 what = message("setups_without_readings", "set-ups without readings")
@@ -224,7 +224,7 @@ def _names_of_setups(stands, places):
     """{place: name}: that of the station, or S1, S2, ...; a second one of a station gets -2."""
     named = {stands[place][0].station for place in places} - {""}
     free = (f"S{number}" for number in range(1, len(places) + len(named) + 2))
-    free = (one for one in free if one not in named)
+    free = (candidate for candidate in free if candidate not in named)
     found, counts = {}, Counter()
     for place in places:
         name = stands[place][0].station or next(free)
@@ -241,40 +241,42 @@ def _station(stand, name):
 
 def _known_points(books, stands, places, names, log):
     """{name: list of (xyz, file, row)} of all coordinates that the files give."""
-    given = [(names[place], *stands[place]) for place in places]
+    occupied = [(names[place], *stands[place]) for place in places]
     items = [
-        (one.station or name, one.xyz_m, file, one.row)
-        for name, one, file in given
-        if one.xyz_m is not None
+        (stand.station or name, stand.xyz_m, file, stand.row)
+        for name, stand, file in occupied
+        if stand.xyz_m is not None
     ]
-    items += [(one.point, one.xyz_m, book.file, one.row) for book in books for one in book.known]
-    found = {}
+    items += [
+        (point.point, point.xyz_m, book.file, point.row) for book in books for point in book.known
+    ]
+    coordinates = {}
     for point, xyz, file, row in items:
-        if any(abs(one) > MOST_M for one in xyz if one is not None):
+        if any(abs(coordinate) > MOST_M for coordinate in xyz if coordinate is not None):
             text = message("coordinate_too_large", "coordinates of {point!r} beyond {most:g} m",
                            point=point[:40], most=MOST_M)  # fmt: skip
             log.problem(file, text, row)
         else:
-            found.setdefault(point, []).append((xyz, file, row))
-    return found
+            coordinates.setdefault(point, []).append((xyz, file, row))
+    return coordinates
 
 
 def _with_times(shots, choices):
     """Shots with the year that times lack; those without a time get one of begin to end."""
     begin, end = choices.begin, choices.end
-    found = []
-    for one in shots:
-        time = one.time
+    dated = []
+    for shot in shots:
+        time = shot.time
         if time is not None and time.year == NO_YEAR:
             time = None if begin is None else _in_year(time, begin.year)
-        found.append(replace(one, time=time))
-    if begin is None or end is None or len(found) < 2:
-        return found
-    step = (end - begin) / (len(found) - 1)
+        dated.append(replace(shot, time=time))
+    if begin is None or end is None or len(dated) < 2:
+        return dated
+    step = (end - begin) / (len(dated) - 1)
     return [
-        replace(one, time=(begin + place * step).replace(microsecond=0)) if one.time is None
-        else one
-        for place, one in enumerate(found)
+        replace(shot, time=(begin + place * step).replace(microsecond=0)) if shot.time is None
+        else shot
+        for place, shot in enumerate(dated)
     ]  # fmt: skip
 
 
@@ -288,7 +290,7 @@ def _in_year(time, year):
 
 def _control_with_times(chosen, choices, unused, log):
     """The same without control readings that have no time; told where the user asked for them."""
-    without = [one.shot for one in chosen.control if one.shot.time is None]
+    without = [reading.shot for reading in chosen.control if reading.shot.time is None]
     if choices.control:
         for shot in without:
             text = message(
@@ -305,7 +307,7 @@ def _control_with_times(chosen, choices, unused, log):
             "--end they are written to control_readings.csv",
         )
         unused[what] = without
-    kept = tuple(one for one in chosen.control if one.shot.time is not None)
+    kept = tuple(reading for reading in chosen.control if reading.shot.time is not None)
     return replace(chosen, control=kept)
 
 
@@ -315,7 +317,7 @@ def _check_ties(chosen, choices, log):
     for key, value in (("--targets-mm", choices.targets_mm),
                        ("--targets-arcsec", choices.targets_arcsec)):  # fmt: skip
         if value is None:
-            points = list(dict.fromkeys(one.shot.point for one in chosen.ties))
+            points = list(dict.fromkeys(reading.shot.point for reading in chosen.ties))
             text = message(
                 "ties_without_sd",
                 "targets {points} tie set-ups; expected the standard deviation of readings to "
@@ -327,14 +329,16 @@ def _check_ties(chosen, choices, log):
 
 def _stations(known, stands, chosen, log):
     """{point: (xyz, file, row)} that the job needs: stations, and targets that tie."""
-    used = [one.station for one, _ in stands.values()] + [one.shot.point for one in chosen.ties]
-    found, told = {}, set()
+    used = [stand.station for stand, _ in stands.values()] + [
+        reading.shot.point for reading in chosen.ties
+    ]
+    stations, reported = {}, set()
     for point in dict.fromkeys(used):
         for xyz, file, row in known.get(point, ()):
-            before = found.setdefault(point, (xyz, file, row))
+            before = stations.setdefault(point, (xyz, file, row))
             pairs = [(a, b) for a, b in zip(before[0], xyz, strict=True) if None not in (a, b)]
-            if any(abs(a - b) > SAME_M for a, b in pairs) and (point, xyz) not in told:
-                told.add((point, xyz))
+            if any(abs(a - b) > SAME_M for a, b in pairs) and (point, xyz) not in reported:
+                reported.add((point, xyz))
                 text = message(
                     "imported_known_twice",
                     "point {point!r} has different coordinates in row {row} of {file}; expected "
@@ -345,4 +349,4 @@ def _stations(known, stands, chosen, log):
                     file=before[1],
                 )
                 log.problem(file, text, row)
-    return found
+    return stations

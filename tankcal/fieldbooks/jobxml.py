@@ -109,15 +109,15 @@ class _Taker:
         self.texts = []
 
     def take(self, kind):
-        own = {
+        take_record = {
             "PointRecord": self.take_point,
             "StationRecord": self.take_station,
             "TargetRecord": self.take_target,
             "AtmosphereRecord": self.take_atmosphere,
             "InstrumentRecord": self.take_instrument,
         }.get(kind)
-        if own is not None:
-            own()
+        if take_record is not None:
+            take_record()
         elif kind not in QUIET:
             self.book.leave_out(message("jxl_records", "records {kind}", kind=kind[:40]), self.row)
 
@@ -131,7 +131,7 @@ class _Taker:
 
     def take_instrument(self):
         named = (self.record.get(key, "")[:40] for key in ("Model", "Serial"))
-        self.book.instrument = " ".join(one for one in named if one)
+        self.book.instrument = " ".join(text for text in named if text)
 
     def take_atmosphere(self):
         is_raw = self.record.get("ApplyPPMToRawDistances", "false").lower() == "true"
@@ -209,17 +209,17 @@ class _Taker:
             book.leave_out(message("jxl_method", "points by {method}", method=method[:40]),
                            self.row)  # fmt: skip
         elif "Grid/North" in self.record:
-            xyz = tuple(self.number(f"Grid/{one}") for one in ("East", "North", "Elevation"))
+            xyz = tuple(self.number(f"Grid/{axis}") for axis in ("East", "North", "Elevation"))
             if None not in xyz[:2]:
                 book.known.append(KnownPoint(name, xyz, self.row))
         else:
             book.leave_out(message("jxl_points", "points without circle readings"), self.row)
 
     def take_shot(self, name):
-        book, given = self.book, self.record.get("StationID")
-        place, ppm = self.stations.get(given, (None, self.last_ppm))
-        if place is None and (given or not book.setups):
-            self.strays.setdefault(given or "", [0, self.row])[0] += 1
+        book, station_id = self.book, self.record.get("StationID")
+        place, ppm = self.stations.get(station_id, (None, self.last_ppm))
+        if place is None and (station_id or not book.setups):
+            self.strays.setdefault(station_id or "", [0, self.row])[0] += 1
             return
         height, prism = self.targets.get(self.record.get("TargetID"), (None, 0.0))
         distance = self.number("Circle/EDMDistance")

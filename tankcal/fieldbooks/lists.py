@@ -46,13 +46,15 @@ class ForeignList:
     @property
     def unused(self):
         """Headings without a meaning."""
-        return [one for one in self.table.headings if one not in self.meanings]
+        return [heading for heading in self.table.headings if heading not in self.meanings]
 
     @property
     def missing(self):
         """Fields that every row needs and that no heading means."""
-        found = {one.column for one in self.meanings.values()}
-        return [one for one in COLUMNS[self.name] if one.required and one.name not in found]
+        columns = {meaning.column for meaning in self.meanings.values()}
+        return [
+            field for field in COLUMNS[self.name] if field.required and field.name not in columns
+        ]
 
 
 def is_table(name):
@@ -87,13 +89,19 @@ def read_list(path, folder, name="points", given=None):
     log.stop_if_problems()
     taken = set(stated.values())
     free = [field for field in fields if field.name not in taken]
-    headings = [one for one in table.headings if one not in stated]
-    own = {one: Meaning(one, Fraction(1)) for one in headings if one in _names(free)}
-    rest = [one for one in headings if one not in own]
-    free = [field for field in free if field.name not in own]
-    found = {head: one for head, one in meanings_of(rest, free).items() if one.factor is not None}
-    found |= own | {head: _stated(head, column, fields) for head, column in stated.items()}
-    meanings = {one: found[one] for one in table.headings if one in found}
+    headings = [head for head in table.headings if head not in stated]
+    identical = {head: Meaning(head, Fraction(1)) for head in headings if head in _names(free)}
+    rest = [head for head in headings if head not in identical]
+    free = [field for field in free if field.name not in identical]
+    recognised = {
+        head: meaning
+        for head, meaning in meanings_of(rest, free).items()
+        if meaning.factor is not None
+    }
+    recognised |= identical | {
+        head: _stated(head, column, fields) for head, column in stated.items()
+    }
+    meanings = {head: recognised[head] for head in table.headings if head in recognised}
     return ForeignList(name, table, meanings, tuple(log.warnings))
 
 
@@ -103,7 +111,7 @@ def _names(fields):
 
 def _stated(heading, column, fields):
     """The Meaning that a user states, with the factor of the unit that the heading has."""
-    [field] = [one for one in fields if one.name == column]
+    [field] = [field_ for field_ in fields if field_.name == column]
     return stated_meaning(heading, field)
 
 
@@ -144,7 +152,7 @@ def _remembered(folder, name, log):
     section = {} if parsed is None else parsed[0].get(name, {})
     columns = {field.name for field in COLUMNS[name]}
     section = section if isinstance(section, dict) else {}
-    return {heading: one for heading, one in section.items() if one in columns}
+    return {heading: column for heading, column in section.items() if column in columns}
 
 
 def refuse_missing(found):
@@ -185,18 +193,18 @@ def _in_columns(found, log):
     """The Table with the columns of the job, decimal points, and lengths in their units."""
     table = found.table
     fields = {field.name: field for field in COLUMNS[found.name]}
-    used = [(place, found.meanings[one]) for place, one in enumerate(table.headings)
-            if one in found.meanings]  # fmt: skip
-    headings = tuple(one.column for _, one in used)
+    used = [(place, found.meanings[heading]) for place, heading in enumerate(table.headings)
+            if heading in found.meanings]  # fmt: skip
+    headings = tuple(meaning.column for _, meaning in used)
     rows = [tuple(row[place] for place, _ in used) for row in table.rows]
     plain = Table(table.file, headings, table.heading_row, tuple(rows), table.row_numbers,
                   table.decimal, table.skipped)  # fmt: skip
     decimal = settle_decimal(plain, [*fields.values()], log)
-    kinds = [fields[one.column].kind for _, one in used]
+    kinds = [fields[meaning.column].kind for _, meaning in used]
     rows = tuple(
         tuple(
-            _converted(cell, one.factor, decimal) if kind == "number" else cell
-            for cell, kind, (_, one) in zip(row, kinds, used, strict=True)
+            _converted(cell, meaning.factor, decimal) if kind == "number" else cell
+            for cell, kind, (_, meaning) in zip(row, kinds, used, strict=True)
         )
         for row in rows
     )
@@ -226,8 +234,8 @@ def _memory_text(found, folder):
     kept = {}
     if path.is_file():
         parsed = parsed_toml(MEMORY_FILE, path.read_bytes(), Log())
-        kept = {name: one for name, one in (parsed or ({},))[0].items() if is_table(name)}
-    now = {heading: one.column for heading, one in found.meanings.items()}
+        kept = {name: columns for name, columns in (parsed or ({},))[0].items() if is_table(name)}
+    now = {heading: meaning.column for heading, meaning in found.meanings.items()}
     kept[found.name] = kept.get(found.name, {}) | now
     lines = []
     for name, headings in kept.items():

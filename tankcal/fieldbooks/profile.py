@@ -109,28 +109,34 @@ def _is_place(value):
 def read(text, file, log, profile):
     """FieldBook of the text of a plain table."""
     book, values = FieldBook(file, "csv"), profile.values
-    places = {key: one - 1 for key, one in profile.columns.items() if not isinstance(one, str)}
-    headings = {key: one for key, one in profile.columns.items() if isinstance(one, str)}
+    places = {
+        key: place - 1 for key, place in profile.columns.items() if not isinstance(place, str)
+    }
+    headings = {
+        key: heading for key, heading in profile.columns.items() if isinstance(heading, str)
+    }
     first, key_of_setup = int(values.get("first_row", 1)), None
     for row, cells in _rows(text, file, values["separator"], log):
         if row < first or not any(cells) or cells[0].startswith("#"):
             continue
         if headings:
-            missing = [one for one in headings.values() if one not in cells]
-            for one in missing:
+            missing = [heading for heading in headings.values() if heading not in cells]
+            for heading in missing:
                 expected = message(
                     "no_such_heading",
                     "no column {heading!r}; expected this heading in the first row",
-                    heading=one,
+                    heading=heading,
                 )
                 log.problem(file, expected, row)
             if missing:
                 return book
-            places |= {key: cells.index(one) for key, one in headings.items()}
+            places |= {key: cells.index(heading) for key, heading in headings.items()}
             headings = None
             continue
-        given = {key: cells[place] if place < len(cells) else "" for key, place in places.items()}
-        key_of_setup = _take(book, log, row, given, values, key_of_setup)
+        row_cells = {
+            key: cells[place] if place < len(cells) else "" for key, place in places.items()
+        }
+        key_of_setup = _take(book, log, row, row_cells, values, key_of_setup)
     book.say_units(length=values["length"], angle=values["angle"])
     return book
 
@@ -157,44 +163,46 @@ def _rows(text, file, separator, log):
         yield row, [cell.strip() for cell in cells]
 
 
-def _take(book, log, row, given, values, before):
+def _take(book, log, row, row_cells, values, before):
     """Take a row; returns what tells its set-up from others."""
     lengths = {}
     for key in ("distance", "instrument_height", "target_height"):
-        lengths[key] = _number(book, log, row, given.get(key, ""), values)
+        lengths[key] = _number(book, log, row, row_cells.get(key, ""), values)
         if lengths[key] is False:
             return before
-    angles = {key: _angle(book, log, row, given[key], values) for key in ("direction", "zenith")}
+    angles = {
+        key: _angle(book, log, row, row_cells[key], values) for key in ("direction", "zenith")
+    }
     if False in angles.values():
         return before
     for key in ("direction", "zenith", "distance"):
-        book.keep_text(key, given[key], row)
-    face = {"": None, "1": 1, "2": 2, "I": 1, "II": 2}.get(given.get("face", "").upper(), 0)
-    time = _time(given.get("time", ""), values)
+        book.keep_text(key, row_cells[key], row)
+    face = {"": None, "1": 1, "2": 2, "I": 1, "II": 2}.get(row_cells.get("face", "").upper(), 0)
+    time = _time(row_cells.get("time", ""), values)
     if face == 0 or time is False:
         text = message(
             "csv_face_or_time",
             "found face {face!r} and time {time!r}; expected face 1 or 2, and a time in the form "
             "of time_format",
-            face=given.get("face", "")[:20],
-            time=given.get("time", "")[:40],
+            face=row_cells.get("face", "")[:20],
+            time=row_cells.get("time", "")[:40],
         )
         log.problem(book.file, text, row)
         return before
     scale = METRES[values["length"]]
     height = lengths["instrument_height"]
     height = values.get("instrument_height_m") if height is None else height * scale
-    here = given.get("setup") or values.get("station", ""), height
+    here = row_cells.get("setup") or values.get("station", ""), height
     if here != before:
         book.stand(*here, None, row)
     zenith = angles["zenith"]
     if zenith is not None and values["vertical"] == "horizon":
         zenith = (FULL_TURN / 4 - zenith) % FULL_TURN
     book.add_shot(
-        log, row, point=given["point"], direction=angles["direction"], zenith=zenith, face=face,
+        log, row, point=row_cells["point"], direction=angles["direction"], zenith=zenith, face=face,
         distance=None if lengths["distance"] is None else lengths["distance"] * scale,
         height=None if lengths["target_height"] is None else lengths["target_height"] * scale,
-        code=given.get("code", ""), time=time,
+        code=row_cells.get("code", ""), time=time,
     )  # fmt: skip
     return here
 
@@ -233,10 +241,10 @@ def _angle(book, log, row, text, values):
 
 def _of_parts(text):
     sign = -1.0 if text.startswith("-") else 1.0
-    parts = [number_of(one) for one in text.translate(_MARKS).split()]
-    if not 1 <= len(parts) <= 3 or None in parts or any(one >= 60 for one in parts[1:]):
+    parts = [number_of(part) for part in text.translate(_MARKS).split()]
+    if not 1 <= len(parts) <= 3 or None in parts or any(part >= 60 for part in parts[1:]):
         return None
-    return sign * sum(one / 60**power for power, one in enumerate(parts))
+    return sign * sum(part / 60**power for power, part in enumerate(parts))
 
 
 def _time(text, values):

@@ -45,32 +45,32 @@ def make_rows(stands, names, stations, sorted_readings, choices):
     """
     tables = {name: [] for name in CONTRACT}
     for place, name in names.items():
-        given, file = stands[place]
+        setup, file = stands[place]
         cells = {
             "setup": name,
-            "station": given.station,
+            "station": setup.station,
             "instrument": choices.instrument,
-            "instrument_height_m": _length(given.height_m),
+            "instrument_height_m": _length(setup.height_m),
         }
-        tables["setups"].append(Row(cells, file, given.row))
-    for one in sorted_readings.hits:
-        cells = _both_angles(one.shot)
-        if is_meant(one.shot, choices.check):
+        tables["setups"].append(Row(cells, file, setup.row))
+    for reading in sorted_readings.hits:
+        cells = _both_angles(reading.shot)
+        if is_meant(reading.shot, choices.check):
             cells["use"] = "check"
-        tables["wall_hits"].append(_row(one, names, cells, distance=True, time=True))
-    for one in sorted_readings.control:
-        cells = {"target": one.shot.point} | _both_angles(one.shot)
-        tables["control_readings"].append(_row(one, names, cells, distance=True, time=True))
-    for one in sorted_readings.ties:
-        _tie(tables, one, names, choices)
+        tables["wall_hits"].append(_row(reading, names, cells, distance=True, time=True))
+    for reading in sorted_readings.control:
+        cells = {"target": reading.shot.point} | _both_angles(reading.shot)
+        tables["control_readings"].append(_row(reading, names, cells, distance=True, time=True))
+    for reading in sorted_readings.ties:
+        _tie(tables, reading, names, choices)
     for point, (xyz, file, row) in stations.items():
         cells = {"point": point} | dict(zip(("x_m", "y_m", "z_m"), map(_length, xyz), strict=True))
         tables["control"].append(Row(cells, file, row))
     return {name: rows for name, rows in tables.items() if rows}
 
 
-def _row(one, names, cells, *, distance=False, time=False):
-    shot = one.shot
+def _row(reading, names, cells, *, distance=False, time=False):
+    shot = reading.shot
     cells = {"setup": names[shot.setup]} | cells
     if distance:
         cells["distance_m"] = _length(shot.distance_m)
@@ -86,8 +86,8 @@ def _both_angles(shot):
     }
 
 
-def _tie(tables, one, names, choices):
-    shot = one.shot
+def _tie(tables, reading, names, choices):
+    shot = reading.shot
     height = _length(shot.target_height_m)
     seconds, millimetres = _number(choices.targets_arcsec), _number(choices.targets_mm)
     for table, column, text, sd in (
@@ -97,7 +97,7 @@ def _tie(tables, one, names, choices):
     ):
         if text:
             cells = {"to": shot.point, column: text, sd[0]: sd[1], "target_height_m": height}
-            tables[table].append(_row(one, names, cells))
+            tables[table].append(_row(reading, names, cells))
 
 
 def _angle(value):
@@ -122,7 +122,7 @@ def _plain(value, decimals):
 
 def check_rows(tables, log):
     """Tell what the job's contract would refuse, each text once, with the row it comes from."""
-    told = set()
+    reported = set()
     for table, rows in tables.items():
         for field in CONTRACT[table]:
             for row in rows:
@@ -134,9 +134,9 @@ def check_rows(tables, log):
                 try:
                     read_value(field, text, ".")
                 except Refused as error:
-                    if (field.name, text) not in told:
+                    if (field.name, text) not in reported:
                         log.problem(row.file, error.text, row.row, f"{table}.{field.name}")
-                    told.add((field.name, text))
+                    reported.add((field.name, text))
 
 
 def _refuse(log, row, table, field):

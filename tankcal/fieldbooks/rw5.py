@@ -78,7 +78,7 @@ def _take(book, log, row, line, state):
         _take_point(book, log, row, state.station, fields, state)
     elif kind == "BK":
         state.back = fields.get("BP")
-        state.azimuth, state.circle = (_angle(fields.get(one), state) for one in ("BS", "BC"))
+        state.azimuth, state.circle = (_angle(fields.get(key), state) for key in ("BS", "BC"))
     elif kind == "LS":
         if "HI" in fields:
             state.height = _length(book, log, row, fields["HI"], state)
@@ -95,23 +95,23 @@ def _fields(line):
     """(kind, {code: text}, note) of a record."""
     body, _, note = line.partition(",--")
     kind, *parts = body.split(",")
-    found = {}
+    fields = {}
     for part in parts:
         part = part.strip()
-        code = next((one for one in _CODES if part.upper().startswith(one)), None)
+        code = next((prefix for prefix in _CODES if part.upper().startswith(prefix)), None)
         if code is not None:
-            found.setdefault(code, part[len(code) :].strip())
-    return kind.strip().upper(), found, note.strip() or found.get("FC", "")
+            fields.setdefault(code, part[len(code) :].strip())
+    return kind.strip().upper(), fields, note.strip() or fields.get("FC", "")
 
 
 def _take_note(book, row, line, state):
     date, time = _DATE.match(line), _TIME.search(line)
     if date:
-        month, day, year = (int(one) for one in date.groups())
+        month, day, year = (int(number) for number in date.groups())
         state.date = (year, month, day)
     if time and state.date:
         try:
-            when = datetime.datetime(*state.date, *(int(one) for one in time.groups()))
+            when = datetime.datetime(*state.date, *(int(number) for number in time.groups()))
         except ValueError:
             return
         if state.follows_shot:
@@ -122,7 +122,7 @@ def _take_note(book, row, line, state):
 
 
 def _take_mode(book, log, row, fields, state):
-    length, angle = (number_of(fields.get(one, "")) for one in ("UN", "AU"))
+    length, angle = (number_of(fields.get(key_, "")) for key_ in ("UN", "AU"))
     angle = 0 if "AU" not in fields else angle
     if length not in UNITS or angle not in (0, 1):
         text = message(
@@ -168,13 +168,13 @@ def _angle(text, state):
 def _take_point(book, log, row, name, fields, state):
     if state.length is None:
         return
-    given = [number_of(fields.get(one, "")) for one in ("E", "N", "EL")]
-    for one, code in zip(given, ("E", "N", "EL"), strict=True):
-        if one is None and fields.get(code):
+    coordinates = [number_of(fields.get(axis, "")) for axis in ("E", "N", "EL")]
+    for value, code in zip(coordinates, ("E", "N", "EL"), strict=True):
+        if value is None and fields.get(code):
             refuse_number(log, book.file, row, fields[code])
-    if name and None not in given[:2]:
+    if name and None not in coordinates[:2]:
         scale = METRES[state.length]
-        xyz = tuple(None if one is None else one * scale for one in given)
+        xyz = tuple(None if value is None else value * scale for value in coordinates)
         book.known.append(KnownPoint(name, xyz, row))
 
 
@@ -202,9 +202,15 @@ def _take_shot(book, log, row, kind, fields, code, state):
     if here != state.key:
         state.key, state.kind = here, None
         book.stand(state.station or "", state.height, None, row, is_told=state.is_told)
-    codes = [one for one in (*_HORIZONTAL, "ZE", "VA", "SD", "HD") if one in fields]
-    given = {one: fields[one] for one in codes}
-    bad = [one for one in codes if one != "BR" and number_of(given[one]) is None]
+    codes = [
+        field_code for field_code in (*_HORIZONTAL, "ZE", "VA", "SD", "HD") if field_code in fields
+    ]
+    texts = {field_code: fields[field_code] for field_code in codes}
+    bad = [
+        field_code
+        for field_code in codes
+        if field_code != "BR" and number_of(texts[field_code]) is None
+    ]
     if bad or "CE" in fields:
         text = message(
             "rw5_fields",
@@ -214,18 +220,22 @@ def _take_shot(book, log, row, kind, fields, code, state):
         )
         log.problem(book.file, text, row)
         return
-    for one in codes:
-        book.keep_text(one, given[one], row)
-    _add(book, log, row, kind, {one: given[one] for one in codes}, code, state,
+    for field_code in codes:
+        book.keep_text(field_code, texts[field_code], row)
+    _add(book, log, row, kind, {field_code: texts[field_code] for field_code in codes}, code, state,
          fields.get("FP", ""))  # fmt: skip
 
 
-def _add(book, log, row, kind, given, code, state, name):
-    angles = {one: _angle(text, state) for one, text in given.items() if one not in ("SD", "HD")}
-    angles |= {"BR": _of_bearing(given["BR"], state)} if "BR" in given else {}
-    bad = [one for one, value in angles.items() if value is None]
+def _add(book, log, row, kind, texts, code, state, name):
+    angles = {
+        field_code: _angle(text, state)
+        for field_code, text in texts.items()
+        if field_code not in ("SD", "HD")
+    }
+    angles |= {"BR": _of_bearing(texts["BR"], state)} if "BR" in texts else {}
+    bad = [field_code for field_code, value in angles.items() if value is None]
     if bad:
-        refuse_minutes(log, book.file, row, given[bad[0]])
+        refuse_minutes(log, book.file, row, texts[bad[0]])
         return
     direction, is_turned = _direction(angles)
     if direction is not None:
@@ -245,9 +255,9 @@ def _add(book, log, row, kind, given, code, state, name):
     zenith = angles.get("ZE")
     if zenith is None and "VA" in angles:
         zenith = FULL_TURN / 4 - angles["VA"]
-    distance = number_of(given["SD"]) if "SD" in given else None
-    if distance is None and "HD" in given and zenith:
-        distance = number_of(given["HD"]) / max(abs(math.sin(math.radians(zenith))), 1e-6)
+    distance = number_of(texts["SD"]) if "SD" in texts else None
+    if distance is None and "HD" in texts and zenith:
+        distance = number_of(texts["HD"]) / max(abs(math.sin(math.radians(zenith))), 1e-6)
     distance = None if distance is None else distance * METRES[state.length]
     book.add_shot(log, row, point=name, direction=direction, zenith=zenith, distance=distance,
                   face=FACES.get(kind), height=state.rod, code=code)  # fmt: skip

@@ -144,17 +144,21 @@ def _take_backsight(book, _log, row, _line, _state):
 def _fields(line, state, names, numbers):
     """Texts of the fields of a record: so many names, then so many numbers."""
     widths = [16 if state.wide else 4] * names + [16 if state.wide else 10] * numbers
-    found, place = [], 4
+    fields, place = [], 4
     for width in widths:
-        found.append(line[place : place + width].strip())
+        fields.append(line[place : place + width].strip())
         place += width
-    return [*found, line[place:].strip()]
+    return [*fields, line[place:].strip()]
 
 
 def _numbers(book, log, row, texts, scale):
     """Numbers of texts, None where one is blank; None after telling the log."""
-    found = [number_of(text) if text.strip() else None for text in texts[:4]]
-    bad = [text for text, one in zip(texts[:4], found, strict=True) if text.strip() and one is None]
+    numbers = [number_of(text) if text.strip() else None for text in texts[:4]]
+    bad = [
+        text
+        for text, number in zip(texts[:4], numbers, strict=True)
+        if text.strip() and number is None
+    ]
     if bad:
         text = message(
             "sdr_number",
@@ -163,7 +167,7 @@ def _numbers(book, log, row, texts, scale):
         )
         log.problem(book.file, text, row)
         return None
-    return [None if one is None else one * scale for one in found]
+    return [None if number is None else number * scale for number in numbers]
 
 
 def _coordinates(values, state):

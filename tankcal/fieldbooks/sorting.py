@@ -33,14 +33,14 @@ def is_meant(shot, patterns):
         if limits and shot.point.isascii() and shot.point.isdigit():
             if int(limits[1]) <= int(shot.point[:18]) <= int(limits[2]):
                 return True
-        elif any(fnmatchcase(one.upper(), pattern.upper()) for one in (shot.point, shot.code)):
+        elif any(fnmatchcase(text.upper(), pattern.upper()) for text in (shot.point, shot.code)):
             return True
     return False
 
 
 def says_hit(shot):
     """Whether its name or its code calls a shot a hit."""
-    return any(one.upper().startswith(SAID) for one in (shot.point, shot.code))
+    return any(text.upper().startswith(SAID) for text in (shot.point, shot.code))
 
 
 def sort_readings(readings, choices, known, log, leave_out):
@@ -51,27 +51,28 @@ def sort_readings(readings, choices, known, log, leave_out):
     leave_out  leave_out(what, Reading): told of each reading that is not used
     """
     hits, control, others = [], [], []
-    for one in readings:
-        shot = one.shot
+    for reading in readings:
+        shot = reading.shot
         if is_meant(shot, choices.leave):
-            leave_out(message("left_by_choice", "left out by choice"), one)
+            leave_out(message("left_by_choice", "left out by choice"), reading)
         elif is_meant(shot, choices.control):
-            control.append(one)
+            control.append(reading)
         elif is_meant(shot, choices.check) or (
             is_meant(shot, choices.hits) if choices.hits else says_hit(shot)
         ):
-            hits.append(one)
+            hits.append(reading)
         else:
-            others.append(one)
+            others.append(reading)
     if not hits and not choices.no_hits:
         _refuse_without_hits(readings, choices, log)
-    whole = [one for one in hits if None not in _values(one.shot)]
-    for one in hits:
-        if None in _values(one.shot):
+    whole = [reading for reading in hits if None not in _values(reading.shot)]
+    for reading in hits:
+        if None in _values(reading.shot):
             leave_out(message("hit_not_whole", "hits without direction, zenith angle or distance"),
-                      one)  # fmt: skip
-    return Sorted(tuple(whole), *_targets(control, others, {one.shot.setup for one in whole},
-                                           choices, known, leave_out))  # fmt: skip
+                      reading)  # fmt: skip
+    setups_of_hits = {reading.shot.setup for reading in whole}
+    targets = _targets(control, others, setups_of_hits, choices, known, leave_out)
+    return Sorted(tuple(whole), *targets)
 
 
 def _values(shot):
@@ -83,34 +84,36 @@ def _targets(control, others, of_hits, choices, known, leave_out):
 
     of_hits  places of the set-ups of hits; one set-up alone needs no tie
     """
-    targets = sorted((*others, *control), key=lambda one: (one.shot.setup, one.shot.row))
-    setups, asked = {}, {id(one) for one in control}
-    for one in targets:
-        setups.setdefault(one.shot.point, set()).add(one.shot.setup)
-    times = Counter((one.shot.setup, one.shot.point) for one in targets)
-    are_several = len({one.shot.setup for one in targets} | of_hits) > 1
+    targets = sorted(
+        (*others, *control), key=lambda reading: (reading.shot.setup, reading.shot.row)
+    )
+    setups, asked = {}, {id(reading) for reading in control}
+    for reading in targets:
+        setups.setdefault(reading.shot.point, set()).add(reading.shot.setup)
+    times = Counter((reading.shot.setup, reading.shot.point) for reading in targets)
+    are_several = len({reading.shot.setup for reading in targets} | of_hits) > 1
     again, ties = [], []
-    for one in targets:
-        name = one.shot.point
+    for reading in targets:
+        name = reading.shot.point
         is_tie = choices.no_hits or (are_several and (len(setups[name]) > 1 or name in known))
-        is_again = id(one) in asked or (
-            times[one.shot.setup, name] > 1 and not (choices.control or choices.no_hits)
+        is_again = id(reading) in asked or (
+            times[reading.shot.setup, name] > 1 and not (choices.control or choices.no_hits)
         )
         if is_tie:
-            ties.append(one)
+            ties.append(reading)
         if is_again:
-            again.append(one)
+            again.append(reading)
         if not is_tie and not is_again:
             what = message(
                 "ties_nothing",
                 "targets that tie no set-ups: read once, from one set-up or from the only set-up",
             )
-            leave_out(what, one)
+            leave_out(what, reading)
     return tuple(again), tuple(ties)
 
 
 def _refuse_without_hits(readings, choices, log):
-    names = _in_ranges([one.shot.point for one in readings])
+    names = _in_ranges([reading.shot.point for reading in readings])
     shown = [*names[:SHOWN], *(["..."] if len(names) > SHOWN else [])]
     text = message(
         "which_are_hits",
@@ -123,17 +126,17 @@ def _refuse_without_hits(readings, choices, log):
 
 def _in_ranges(names):
     """Names in their order, runs of numbers as 1-200."""
-    found = []
+    runs = []
     for name in dict.fromkeys(names):
         if name.isascii() and name.isdigit() and len(name) < 10:
             number = int(name)
-            if found and isinstance(found[-1], list) and found[-1][1] == number - 1:
-                found[-1][1] = number
+            if runs and isinstance(runs[-1], list) and runs[-1][1] == number - 1:
+                runs[-1][1] = number
                 continue
-            found.append([number, number])
+            runs.append([number, number])
         else:
-            found.append(name[:30])
+            runs.append(name[:30])
     return [
-        one if isinstance(one, str) else str(one[0]) if one[0] == one[1] else f"{one[0]}-{one[1]}"
-        for one in found
+        run if isinstance(run, str) else str(run[0]) if run[0] == run[1] else f"{run[0]}-{run[1]}"
+        for run in runs
     ]

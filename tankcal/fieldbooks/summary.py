@@ -23,7 +23,7 @@ def summarise(books, chosen, unused, names, stands, reports, coordinates, standi
         lines += _of_book(book)
     shown = [_of_setup(name, stands[place][0].station) for place, name in names.items()]
     lines.append(message("import_setups", "set-ups: {names}", names=list_some(shown, SHOWN)))
-    reports = [one for one in reports if one.setup in names]
+    reports = [report for report in reports if report.setup in names]
     for report in reports:
         lines += _of_faces(names[report.setup], report)
     lines.append(message("import_hits", "hits of the wall: {count}", count=len(chosen.hits)))
@@ -46,11 +46,11 @@ def summarise(books, chosen, unused, names, stands, reports, coordinates, standi
                 "not used: {what}: {count} ({names})",
                 what=what,
                 count=len(shots),
-                names=list_some(list(dict.fromkeys(one.point or "?" for one in shots)), SHOWN),
+                names=list_some(list(dict.fromkeys(shot.point or "?" for shot in shots)), SHOWN),
             )
         )
     if standing:
-        tables = [f"{one}.csv" for one in standing]
+        tables = [f"{table}.csv" for table in standing]
         lines.append(
             message(
                 "import_standing",
@@ -66,17 +66,17 @@ def _of_setup(name, station):
 
 
 def _of_book(book):
-    made = [NAMES[book.format], *([book.instrument] if book.instrument else [])]
-    yield message("import_file", "{file}: {made}; {units}", file=book.file, made=made,
+    source = [NAMES[book.format], *([book.instrument] if book.instrument else [])]
+    yield message("import_file", "{file}: {made}; {units}", file=book.file, made=source,
                   units=book.units or ["-"])  # fmt: skip
     if book.format in APPLIED_BY_INSTRUMENT and book.shots:
-        constants = sorted({one.prism_mm for one in book.shots if one.prism_mm is not None})
+        constants = sorted({shot.prism_mm for shot in book.shots if shot.prism_mm is not None})
         yield message(
             "import_applied",
             "{file}: distances as written by the instrument, including its prism constant "
             "({constants}) and ppm: no correction is applied again",
             file=book.file,
-            constants=[f"{one:+g} mm" for one in constants] or ["-"],
+            constants=[f"{constant:+g} mm" for constant in constants] or ["-"],
         )
     for note in book.notes:
         yield message("import_note", "{file}: {note}", file=book.file, note=note)
@@ -129,7 +129,7 @@ def _of_faces(setup, report):
 
 def _of_targets(chosen):
     for readings, is_control in ((chosen.control, True), (chosen.ties, False)):
-        points = list(dict.fromkeys(one.shot.point for one in readings))
+        points = list(dict.fromkeys(reading.shot.point for reading in readings))
         if points and is_control:
             yield message("import_control", "readings of control targets: {count} ({names})",
                           count=len(readings), names=list_some(points, SHOWN))  # fmt: skip
@@ -140,7 +140,7 @@ def _of_targets(chosen):
 
 def warn_of(chosen, names, stands, reports):
     """Problems that do not stop an import, but deserve a look."""
-    found = []
+    problems = []
     for place, name in names.items():
         stand, file = stands[place]
         if not stand.is_told and stand.height_m is not None:
@@ -151,7 +151,7 @@ def warn_of(chosen, names, stands, reports):
                 "record is not detected; check setups.csv",
                 setup=name,
             )
-            found.append(Problem(file, text, stand.row))
+            problems.append(Problem(file, text, stand.row))
         elif not stand.is_told:
             text = message(
                 "no_station",
@@ -159,15 +159,15 @@ def warn_of(chosen, names, stands, reports):
                 "height are unknown; enter them in setups.csv before you run the job",
                 setup=name,
             )
-            found.append(Problem(file, text, stand.row))
+            problems.append(Problem(file, text, stand.row))
         elif stand.height_m is None:
             text = message(
                 "no_instrument_height",
                 "set-up {setup}: the file has no instrument height; it is left blank (0)",
                 setup=name,
             )
-            found.append(Problem(file, text, stand.row))
-    for report in (one for one in reports if one.setup in names):
+            problems.append(Problem(file, text, stand.row))
+    for report in (report for report in reports if report.setup in names):
         name, file = names[report.setup], stands[report.setup][1]
         for what in (report.collimation, report.index):
             if what is not None and max(abs(what[0]), what[1]) > LARGE_DEG:
@@ -180,7 +180,7 @@ def warn_of(chosen, names, stands, reports):
                     size=ARCSEC * max(abs(what[0]), what[1]),
                     limit=ARCSEC * LARGE_DEG,
                 )
-                found.append(Problem(file, text))
+                problems.append(Problem(file, text))
                 break
         if report.apart_m > LARGE_M:
             text = message(
@@ -191,7 +191,7 @@ def warn_of(chosen, names, stands, reports):
                 apart_mm=1000 * report.apart_m,
                 limit_mm=1000 * LARGE_M,
             )
-            found.append(Problem(file, text))
+            problems.append(Problem(file, text))
     if len(chosen.hits) > MOST_HITS:
         shot = chosen.hits[0].shot
         text = message(
@@ -200,8 +200,8 @@ def warn_of(chosen, names, stands, reports):
             count=len(chosen.hits),
             most=MOST_HITS,
         )
-        found.append(Problem(shot.file, text, shot.row))
-    found += _of_constants(chosen)
+        problems.append(Problem(shot.file, text, shot.row))
+    problems += _of_constants(chosen)
     if chosen.ties:
         text = message(
             "frame_not_held",
@@ -209,18 +209,18 @@ def warn_of(chosen, names, stands, reports):
             "standard deviations of known points here, or set [adjustment] datum = 'minimal' in "
             "job.toml",
         )
-        found.append(Problem("control.csv", text))
-    return found
+        problems.append(Problem("control.csv", text))
+    return problems
 
 
 def _of_constants(chosen):
     """Hits that seem to have been read with the constant of a prism."""
-    hits = {one.shot.prism_mm for one in chosen.hits} - {None}
-    targets = {one.shot.prism_mm for one in (*chosen.control, *chosen.ties)} - {None}
+    hits = {reading.shot.prism_mm for reading in chosen.hits} - {None}
+    targets = {reading.shot.prism_mm for reading in (*chosen.control, *chosen.ties)} - {None}
     first = chosen.hits[0].shot if chosen.hits else None
     if len(hits) > 1:
         text = message("several_constants", "hits with several prism constants: {constants} mm",
-                       constants=[f"{one:+g}" for one in sorted(hits)])  # fmt: skip
+                       constants=[f"{constant:+g}" for constant in sorted(hits)])  # fmt: skip
         yield Problem(first.file, text, first.row)
     elif hits - {0.0} and hits == targets:
         text = message(

@@ -28,7 +28,7 @@ def write_tables(folder, tables, *, replace):
     refuse_standing(folder, [] if replace else [name for name in standing if name in tables])
     grids = {name: _grid(name, rows) for name, rows in tables.items()}
     paths = write_grids(folder, grids)
-    return paths, [one for one in standing if one not in tables]
+    return paths, [table for table in standing if table not in tables]
 
 
 def tables_with_rows(folder, names):
@@ -94,7 +94,7 @@ def _comments(path):
 
 def _grid(name, rows):
     columns = columns_of(name, rows)
-    return [columns, *([row.cells.get(one, "") for one in columns] for row in rows)]
+    return [columns, *([row.cells.get(column, "") for column in columns] for row in rows)]
 
 
 def _text(name, grid, separator, decimal):

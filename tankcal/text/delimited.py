@@ -31,10 +31,10 @@ def separator_of_table(lines, usual):
     usual  the separator of a table of one column
     """
     heading = "".join(lines[0].split('"')[::2]) if lines else ""  # what is outside the quotes
-    found = [mark for mark in BY_CERTAINTY if mark in heading]
-    if len(found) == 1:
-        return found[0]
-    return find_separator(lines) if found else usual
+    marks = [mark for mark in BY_CERTAINTY if mark in heading]
+    if len(marks) == 1:
+        return marks[0]
+    return find_separator(lines) if marks else usual
 
 
 def split_cells(line, separator):

@@ -85,7 +85,7 @@ def format_with_u(
         return Written(NOTHING, NOTHING, "", NOTHING, NOTHING, UNKNOWN_DECIMALS)
     known = _is_number(u)
     number, spread = _exact(value), _exact(u if known else 0.0)
-    exponent = max((one.adjusted() for one in (number, spread) if one), default=0)
+    exponent = max((quantity.adjusted() for quantity in (number, spread) if quantity), default=0)
     exponent = 0 if exponent in written_out else exponent
     number, spread = number.scaleb(-exponent, _WIDE), spread.scaleb(-exponent, _WIDE)
     decimals = _decimals(spread, significant, least)
@@ -145,14 +145,14 @@ def decimals_of_rows(
     """
     most = inf if most is None else most
     known = [_is_number(u) and u != 0 for u in uncertainties]
-    found = [
+    decimals = [
         min(decimals_of(u, significant=significant, least=least), most) if here else None
         for u, here in zip(uncertainties, known, strict=True)
     ]
-    following = next((d for d in reversed(found) if d is not None), unknown)
-    for i in reversed(range(len(found))):
-        following = found[i] = following if found[i] is None else found[i]
-    return found
+    following = next((d for d in reversed(decimals) if d is not None), unknown)
+    for i in reversed(range(len(decimals))):
+        following = decimals[i] = following if decimals[i] is None else decimals[i]
+    return decimals
 
 
 def decimals_of_height(height_m):

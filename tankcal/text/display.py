@@ -37,7 +37,7 @@ def table_html(caption: str, headings, rows) -> str:
     >>> "<td>2 &lt; 3</td>" in table_html("Rows", ["a"], [["2 < 3"]])
     True
     """
-    head = "".join(f"<th>{escape(str(one))}</th>" for one in headings)
+    head = "".join(f"<th>{escape(str(heading))}</th>" for heading in headings)
     body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
     return (
         f"<table><caption>{escape(caption)}</caption>"

@@ -149,16 +149,16 @@ def meant(word, choices):
     or not: "DIN 28011" for din_28011. Units and codes of one or two letters are taken as they are.
     """
     plain = _plain(word)
-    found = {
+    matches = {
         choice
         for words in FORM_WORDS.values()
         for choice in choices
         if plain in map(_plain, words.get(choice, ()))
     }
-    if not found:
+    if not matches:
         bare = _bare(word)
-        found = {one for one in choices if len(bare) > 2 and _bare(one) == bare}
-    return found.pop() if len(found) == 1 else None
+        matches = {choice for choice in choices if len(bare) > 2 and _bare(choice) == bare}
+    return matches.pop() if len(matches) == 1 else None
 
 
 def _bare(word):

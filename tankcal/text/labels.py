@@ -41,18 +41,18 @@ def write_labels(ax, labels, marks, *, size, room=MARK, **style):
     The axes must have their final limits and place.
     """
     ax.apply_aspect()
-    places = _in_points(ax, np.array([[one.x, one.y] for one in labels]).reshape(-1, 2))
+    places = _in_points(ax, np.array([[item.x, item.y] for item in labels]).reshape(-1, 2))
     around = _in_points(ax, np.asarray(marks, dtype=float).reshape(-1, 2))
     half = np.broadcast_to(np.asarray(room, dtype=float), len(around))[:, None]
     taken = np.column_stack([around - half, around + half])
     frame = _in_points(ax, np.array([[*ax.get_xlim()], [*ax.get_ylim()]]).T).ravel()
     left_out = 0
     for label, place in zip(labels, places, strict=True):
-        found = _free(label, place, taken, frame, size)
-        if found is None:
+        position = _free(label, place, taken, frame, size)
+        if position is None:
             left_out += 1
             continue
-        text, side, offset, box = found
+        text, side, offset, box = position
         taken = np.vstack([taken, box])
         ax.annotate(
             text, (label.x, label.y), textcoords="offset points", xytext=offset, fontsize=size,

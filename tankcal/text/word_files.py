@@ -45,7 +45,7 @@ def _pickled(path, groups):
 def _tables_of(text, groups):
     """The tables of a TOML text that are of these groups; no string of it begins a line with [."""
     heads = list(_TABLE.finditer(text))
-    ends = [one.start() for one in heads[1:]] + [len(text)]
+    ends = [head.start() for head in heads[1:]] + [len(text)]
     return "".join(
         text[head.start() : end] for head, end in zip(heads, ends, strict=True) if head[1] in groups
     )

@@ -61,7 +61,9 @@ MESSAGES = ("warnings", "formulas", "datum", "problems")  # groups of their temp
 
 def message_sentence(words, text, code, values):
     """A text of the record in the reader's language; as it is where its code has no words."""
-    template = next((words[one][code] for one in MESSAGES if code in words.get(one, {})), None)
+    template = next(
+        (words[group][code] for group in MESSAGES if code in words.get(group, {})), None
+    )
     if template is None:
         return text
     named = {key: _named(words, key, value) for key, value in values.items()}
@@ -69,7 +71,9 @@ def message_sentence(words, text, code, values):
         template,
         named,
         number=lambda value, form: _number(value, form, marks_of(words)),
-        said=lambda one: message_sentence(words, one["text"], one["code"], one["values"]),
+        said=lambda nested: message_sentence(
+            words, nested["text"], nested["code"], nested["values"]
+        ),
     )
 
 
@@ -84,27 +88,27 @@ def translate_record(words, record):
     adjustment, corrections = record["adjustment"], record["corrections"]
     return {
         **record,
-        "warnings": [_placed(words, _said(words, one, "text")) for one in record["warnings"]],
-        "corrections": [_said(words, one, "formula", "formula_") for one in corrections],
+        "warnings": [_placed(words, _said(words, row, "text")) for row in record["warnings"]],
+        "corrections": [_said(words, row, "formula", "formula_") for row in corrections],
         "adjustment": adjustment and _adjustment_in_language(words, adjustment),
         "rule": record.get("rule") and _rule_in_language(words, record),
     }
 
 
 def _adjustment_in_language(words, adjustment):
-    left_out = [_said(words, one, "text") for one in adjustment.get("left_out", [])]
+    left_out = [_said(words, row, "text") for row in adjustment.get("left_out", [])]
     places = {}
     if residuals := adjustment.get("residuals"):  # by columns
         files = residuals["file"]
-        said = {one: _place_said(words, one) for one in set(files)}
-        places["residuals"] = residuals | {"file": [said[one] for one in files]}
+        translated = {file: _place_said(words, file) for file in set(files)}
+        places["residuals"] = residuals | {"file": [translated[file] for file in files]}
     if held := adjustment.get("held"):
-        places["held"] = [_placed(words, one) for one in held]
+        places["held"] = [_placed(words, row) for row in held]
     return {
         **adjustment,
         **places,
         "datum": _said(words, adjustment["datum"], "words", "words_"),
-        "aside": [one["text"] for one in left_out] or adjustment["aside"],
+        "aside": [row["text"] for row in left_out] or adjustment["aside"],
     }
 
 
@@ -160,10 +164,10 @@ def _named(words, key, value):
         name = words["observed"].get(value, value)
         return name[:1].lower() + name[1:]
     if key == "inputs":
-        return "; ".join(name_of_input(words, one) for one in value)
+        return "; ".join(name_of_input(words, code) for code in value)
     if key == "entries":  # of [certificate]
         labels = words["page"] | words["labels"]
-        return "; ".join(labels.get(one, one) for one in value)
+        return "; ".join(labels.get(entry, entry) for entry in value)
     return value
 
 
@@ -202,7 +206,7 @@ def input_name(words, row):
 
 def name_of_input(words, code):
     """An input by its code; correlated ones are one, "a & b"."""
-    return " & ".join(words["inputs"].get(one, one) for one in code.split(" & "))
+    return " & ".join(words["inputs"].get(part, part) for part in code.split(" & "))
 
 
 # ---- what the record says of an adjustment: the same sentences on paper and in the workbook
@@ -263,21 +267,21 @@ def datum_sentences(words, adjustment):
     """What holds the frame, and what depends on that choice."""
     datum, texts = adjustment["datum"], words["texts"]
     held = [name for name in datum["held"] if datum["choice"] != "inner" or ":" not in name]
-    found = [texts[f"datum_{datum['choice']}"].format(held=list_names(words, held))]
+    sentences = [texts[f"datum_{datum['choice']}"].format(held=list_names(words, held))]
     if len(held) < len(datum["held"]):
         fixed = [name for name in datum["held"] if ":" in name]
-        found = [
+        sentences = [
             texts["datum_fixed"].format(held=list_names(words, fixed)),
-            *(found if held else []),
+            *(sentences if held else []),
         ]
     if datum["defect"]:
         words_of_defect = datum["words"].split(";")[0].rstrip(".")
-        found.append(texts["datum_defect"].format(words=words_of_defect))
+        sentences.append(texts["datum_defect"].format(words=words_of_defect))
         by_control = "_control" if datum["choice"] == "control" else ""
-        found.append(texts[f"datum_dependent{by_control}"])
+        sentences.append(texts[f"datum_dependent{by_control}"])
     for what in ("vertical", "scale"):
-        found.append(texts[f"{what}_{'observed' if datum[what] else 'not_observed'}"])
-    return found
+        sentences.append(texts[f"{what}_{'observed' if datum[what] else 'not_observed'}"])
+    return sentences
 
 
 def verdict_sentences(words, adjustment):
