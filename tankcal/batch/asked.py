@@ -55,7 +55,9 @@ class Asked:
     def absolute(self):
         """The same with the files that are there by their absolute paths, for other processes."""
         named = {name: getattr(self, name) for name in FILES}
-        there = {name: os.path.abspath(one) for name, one in named.items() if one and exists(one)}
+        there = {
+            name: os.path.abspath(path) for name, path in named.items() if path and exists(path)
+        }
         return replace(self, **there)
 
 
@@ -72,8 +74,8 @@ def parse_steps(text):
     >>> parse_steps("export, run")
     ('run', 'export')
     """
-    named = [one.strip() for one in text.split(",") if one.strip()]
-    unknown = [one for one in named if one not in STEPS]
+    named = [part.strip() for part in text.split(",") if part.strip()]
+    unknown = [name for name in named if name not in STEPS]
     if unknown or not named:
         expected = message(
             "batch_steps",
@@ -82,7 +84,7 @@ def parse_steps(text):
             steps=[*STEPS],
         )
         raise InputError(Problem("--do", expected))
-    return tuple(one for one in STEPS if one in named)
+    return tuple(step for step in STEPS if step in named)
 
 
 def refuse_incomplete(asked, jobs):

@@ -95,26 +95,31 @@ def _in_the_way(task, error):
 def _do_steps(task):
     """What `do_job` gives."""
     name, steps = task.job.name, task.job.asked.do
-    found = load_outcome(task.out, name) or Outcome(name, task.job.source)
-    if not found.is_settled_for(task.keys):  # or its worker died before it could say so
+    outcome = load_outcome(task.out, name) or Outcome(name, task.job.source)
+    if not outcome.is_settled_for(task.keys):  # or its worker died before it could say so
         journal, clock = Journal(task.out, task.run), Clock()
         journal.note("begun", name)
-        found = _after_steps(replace(found, source=task.job.source), task, clock)
-        journal.note("ended", name, status=found.status(steps), cpu_s=clock.seconds())
-    done, status = [found.steps[one] for one in steps if one in found.steps], found.status(steps)
-    problems = [one for step in done for one in step.problems]
+        outcome = _after_steps(replace(outcome, source=task.job.source), task, clock)
+        journal.note("ended", name, status=outcome.status(steps), cpu_s=clock.seconds())
+    done, status = (
+        [outcome.steps[step] for step in steps if step in outcome.steps],
+        outcome.status(steps),
+    )
+    problems = [problem for step in done for problem in step.problems]
     return status, problems[:1], sum(step.problem_count for step in done)
 
 
-def _after_steps(found, task, clock):
+def _after_steps(outcome, task, clock):
     """The `Outcome` after the steps that were not settled, written after each."""
     for step in task.job.asked.do:
-        if not found.is_settled(step, task.keys[step]):
-            found = replace(found, steps={**found.steps, step: _outcome_of(step, task, clock)})
-            save_outcome(task.out, found)
-        if step == "run" and found.steps[step].status != "done":
+        if not outcome.is_settled(step, task.keys[step]):
+            outcome = replace(
+                outcome, steps={**outcome.steps, step: _outcome_of(step, task, clock)}
+            )
+            save_outcome(task.out, outcome)
+        if step == "run" and outcome.steps[step].status != "done":
             break
-    return found
+    return outcome
 
 
 def _check_folder(task):
@@ -148,7 +153,7 @@ def _outcome_of(step, task, clock):
     except TankcalError as error:
         status = STATUS_OF_EXIT.get(error.exit_status, "failed")
         problems = getattr(error, "problems", None)
-        return _unfinished(key, status, problems or [Problem(name, one) for one in error.texts])
+        return _unfinished(key, status, problems or [Problem(name, text) for text in error.texts])
     except MemoryError:
         text = message("batch_no_memory", "not enough memory")
         return _unfinished(key, "failed", [Problem(name, text)])
@@ -168,7 +173,7 @@ def _outcome_of(step, task, clock):
     return StepOutcome(
         key,
         "done",
-        files=sorted(Path(one).name for one in written),
+        files=sorted(Path(path).name for path in written),
         values=values,
         warnings=warnings[:MOST_TOLD],
         warning_count=len(warnings),
@@ -176,8 +181,8 @@ def _outcome_of(step, task, clock):
 
 
 def _unfinished(key, status, problems):
-    told = [problem_of(one) for one in problems[:MOST_TOLD]]
-    return StepOutcome(key, status, problems=told, problem_count=len(problems))
+    plain_problems = [problem_of(problem) for problem in problems[:MOST_TOLD]]
+    return StepOutcome(key, status, problems=plain_problems, problem_count=len(problems))
 
 
 # ---- the steps: each writes its folder, all or nothing, and gives the paths
@@ -215,9 +220,9 @@ def _compare(task, clock):
     from tankcal.report.comparison import write_comparison
 
     record, asked = _record(task), task.job.asked
-    found = compare_files(Asked(former_of(task.job), record, rule=asked.compare_by))
+    comparison = compare_files(Asked(former_of(task.job), record, rule=asked.compare_by))
     return write_comparison(
-        plain_of_comparison(found), _place(task, "compare"), _language(task, record), None,
+        plain_of_comparison(comparison), _place(task, "compare"), _language(task, record), None,
         _letterhead(asked),
     )  # fmt: skip
 
@@ -229,8 +234,8 @@ def _inspect(task, clock):
 
     asked = task.job.asked
     source, rule, levelled = reading.source_of_inspection(task.job, _place(task, "run"))
-    found = inspect_files(Asked(source, rule=asked.inspect_by or rule, **levelled))
-    plain = plain_of_inspection(found)
+    inspection = inspect_files(Asked(source, rule=asked.inspect_by or rule, **levelled))
+    plain = plain_of_inspection(inspection)
     language = asked.language or reading.language_of(source)
     return write_inspection(plain, _place(task, "inspect"), language, None, _letterhead(asked))
 
@@ -258,8 +263,8 @@ def _place(task, step):
 
 def _record(task):
     """The saved file that a step is done with: of this batch's run, or the job's own."""
-    made = _place(task, "run") / RECORD
-    return made if "run" in task.job.asked.do else Path(task.job.source)
+    record = _place(task, "run") / RECORD
+    return record if "run" in task.job.asked.do else Path(task.job.source)
 
 
 def _language(task, record):
@@ -312,5 +317,5 @@ class Clock:
 
 
 def _processor_s():
-    found = os.times()
-    return found.user + found.system + found.children_user + found.children_system
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system

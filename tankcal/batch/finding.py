@@ -105,13 +105,13 @@ def find_jobs(arguments, asked, out=None, known=None):
     InputError
         For lists that cannot be read, and arguments that name no job.
     """
-    log, found = Log(), {}
+    log, jobs = Log(), {}
     wants = _Wanted(_wanted(asked.do), out)
     for argument in arguments:
-        for one in _named(argument, wants, log):
-            found.setdefault(os.path.abspath(one.source), one)  # a link is a job of its own
+        for job in _named(argument, wants, log):
+            jobs.setdefault(os.path.abspath(job.source), job)  # a link is a job of its own
     log.stop_if_problems()
-    return _with_names(found, asked, known or {})
+    return _with_names(jobs, asked, known or {})
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ def _named(argument, wants, log):
         if not names:
             text = message("batch_no_match", "no file or folder matches; expected jobs")
             log.problem(argument, text)
-        return [one for name in names for one in _in_path(Path(name), wants, log, strict=False)]
+        return [job for name in names for job in _in_path(Path(name), wants, log, strict=False)]
     return _in_path(path, wants, log)
 
 
@@ -163,7 +163,7 @@ def _in_path(path, wants, log, strict=True):
     if not inside and strict:
         results = None if wants.kind == "records" else results_given_as_job(path)
         log.problem(str(path), results or _nothing_inside(wants.kind))
-    return [Found(one, {}) for one in inside]
+    return [Found(source, {}) for source in inside]
 
 
 def _nothing_inside(kind):
@@ -198,7 +198,7 @@ def _of_itself(path, wants):
 
 def _in_folder(folder, wants):
     """Jobs below a folder, sorted; hidden folders, and what lies in jobs, are passed over."""
-    found = []
+    sources = []
 
     def fail(error):
         raise error
@@ -210,21 +210,23 @@ def _in_folder(folder, wants):
             continue
         of_batch = OUTCOME in names  # a job in the folder of another batch: its papers are no job
         folders[:] = sorted(
-            one for one in folders if one[0] != "." and not (of_batch and one in OF_BATCH)
+            folder_name
+            for folder_name in folders
+            if folder_name[0] != "." and not (of_batch and folder_name in OF_BATCH)
         )
         saved = [name for name in SAVED if name in names]
         if wants.kind == "records":
-            found += [place / name for name in saved]
+            sources += [place / name for name in saved]
         elif SETTINGS_FILE in names:
-            found.append(place)
+            sources.append(place)
             folders.clear()
         elif saved:
-            found += [place / saved[0]] if wants.kind == "either" else []
+            sources += [place / saved[0]] if wants.kind == "either" else []
             folders.clear()
         else:
-            books = (place / one for one in sorted(names) if one[0] not in ".~")
-            found += [one for one in books if one.suffix.lower() == BOOK and _is_job(one)]
-    return sorted(found)
+            books = (place / name for name in sorted(names) if name[0] not in ".~")
+            sources += [book for book in books if book.suffix.lower() == BOOK and _is_job(book)]
+    return sorted(sources)
 
 
 def _is_job(book):
@@ -246,24 +248,24 @@ def _listed(path, wants, log):
     text = None if data is None else decode(path.name, data, log)
     if text is None:
         return []
-    told = len(log.problems)
+    problems_before = len(log.problems)
     rows = list(_rows(path, text, log)) if is_csv else _plain_rows(text.splitlines())
-    found = []
-    for own in rows:
-        job = own.pop("job")
+    jobs = []
+    for cells in rows:
+        job = cells.pop("job")
         for name in OWN:  # files from the list's folder; else names, such as of a shipped rule
-            beside = path.parent / own.get(name, "")
-            if own.get(name) and (name == "former" or beside.is_file()):
-                own[name] = os.path.abspath(beside)
+            beside = path.parent / cells.get(name, "")
+            if cells.get(name) and (name == "former" or beside.is_file()):
+                cells[name] = os.path.abspath(beside)
         source = path.parent / job
         inside = _in_path(source, wants, log, strict=False) or [Found(source, {})]
-        found += [Found(one.source, own) for one in inside]
-    if not found and len(log.problems) == told:
+        jobs += [Found(job_found.source, cells) for job_found in inside]
+    if not jobs and len(log.problems) == problems_before:
         log.problem(
             path.name,
             message("batch_empty_list", "the list contains no jobs; expected one job per row"),
         )
-    return found
+    return jobs
 
 
 def _plain_rows(lines):
@@ -289,7 +291,7 @@ def _rows(path, text, log):
     if not table:
         return []
     row, headings = table[0]
-    wrong = [one for one in headings if one not in HEADINGS]
+    wrong = [heading for heading in headings if heading not in HEADINGS]
     if wrong or HEADINGS[0] not in headings or len(set(headings)) < len(headings):
         text = message(
             "batch_headings",
@@ -311,9 +313,9 @@ def _dicts(path, headings, table, log):
                            found=len(cells), most=len(headings))  # fmt: skip
             log.problem(path.name, text, row)
             continue
-        own = dict(zip(headings, cells, strict=False))
-        if own.get("job"):
-            yield own
+        row_cells = dict(zip(headings, cells, strict=False))
+        if row_cells.get("job"):
+            yield row_cells
         else:
             log.problem(
                 path.name, message("batch_no_job_cell", "blank; expected a job"), row, "job"
@@ -325,7 +327,7 @@ def _dicts(path, headings, table, log):
 
 def _with_names(found, asked, known):
     """`BatchJob`s, each with a name that no other one has."""
-    labels = {source: _label(one) for source, one in found.items()}
+    labels = {source: _label(job) for source, job in found.items()}
     taken = {name.casefold(): source for source, name in known.items() if os.path.exists(source)}
     counts = Counter(label.casefold() for label in labels.values())
     jobs = []
@@ -335,8 +337,8 @@ def _with_names(found, asked, known):
         name = known.get(source, label)
         if source not in known and (counts[label.casefold()] > 1 or owner != source):
             name = f"{label}~{sha256(source.encode(errors='replace')).hexdigest()[:DIGITS]}"
-        own = {key: value for key, value in one.own.items() if key in OWN}
-        jobs.append(BatchJob(name, label, source, asked.with_own(own)))
+        own_choices = {key: value for key, value in one.own.items() if key in OWN}
+        jobs.append(BatchJob(name, label, source, asked.with_own(own_choices)))
     _refuse_doubles(jobs)
     return sorted(jobs, key=lambda job: job.name)
 
@@ -353,11 +355,11 @@ def _refuse_doubles(jobs):
         raise InputError(Problem("JOBS", text))
 
 
-def _label(one):
+def _label(job):
     """The name of a job by itself: as its list says, or of its folder or workbook."""
-    if one.own.get("name"):
-        return file_name(one.own["name"], "job")
-    path = Path(os.path.abspath(one.source))
+    if job.own.get("name"):
+        return file_name(job.own["name"], "job")
+    path = Path(os.path.abspath(job.source))
     if path.name == WORKBOOK_FILE:
         path = path.parent
     if path.name not in SAVED:

@@ -94,7 +94,7 @@ def inputs_of(source):
 
 def _files_below(folder):
     """Names of the files below a folder that a job there could read, sorted."""
-    found = []
+    paths = []
     for place, folders, names in os.walk(folder):
         if place != folder and not RESULTS.isdisjoint(names):
             folders.clear()
@@ -105,8 +105,8 @@ def _files_below(folder):
                 continue
             path = os.path.join(place, name)
             if os.path.isfile(path):
-                found.append(os.path.relpath(path, folder).replace(os.sep, "/"))
-    return sorted(found)
+                paths.append(os.path.relpath(path, folder).replace(os.sep, "/"))
+    return sorted(paths)
 
 
 _files_beside = lru_cache(maxsize=64)(_files_below)  # of folders with many workbooks
@@ -114,18 +114,18 @@ _files_beside = lru_cache(maxsize=64)(_files_below)  # of folders with many work
 
 def _named_in_book(path):
     """Files beside a workbook that it names, and the tables of an inspection; sorted."""
-    beside = [one for one in _files_beside(str(path.parent)) if not one.lower().endswith(BOOK)]
+    beside = [name for name in _files_beside(str(path.parent)) if not name.lower().endswith(BOOK)]
     if not beside:
         return []
     try:
         with zipfile.ZipFile(path) as book:
-            parts = [one.filename for one in book.infolist() if one.filename.endswith(".xml")]
-            if sum(one.file_size for one in book.infolist()) > MOST_UNPACKED_BYTES:
+            parts = [part.filename for part in book.infolist() if part.filename.endswith(".xml")]
+            if sum(part.file_size for part in book.infolist()) > MOST_UNPACKED_BYTES:
                 return []
-            text = unescape(" ".join(book.read(one).decode(errors="replace") for one in parts))
+            text = unescape(" ".join(book.read(part).decode(errors="replace") for part in parts))
     except (OSError, ValueError, zipfile.BadZipFile, NotImplementedError, RuntimeError):
         return []
-    return [one for one in beside if one in text or one in OF_INSPECTIONS]
+    return [name for name in beside if name in text or name in OF_INSPECTIONS]
 
 
 def _named_in_former(path):
@@ -146,8 +146,8 @@ def _content(named):
 
 
 def _digest(path):
-    found = os.stat(path)
-    return _digest_as_of(str(path), found.st_size, found.st_mtime_ns)
+    status = os.stat(path)
+    return _digest_as_of(str(path), status.st_size, status.st_mtime_ns)
 
 
 @lru_cache(maxsize=4096)

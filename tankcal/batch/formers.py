@@ -43,10 +43,10 @@ def former_of(job):
     if (folder / RECORD).is_file():
         return folder / RECORD
     names = (_names_in(str(folder)).get(job.source), job.name, job.label)
-    for name in dict.fromkeys(one for one in names if one):
+    for name in dict.fromkeys(label for label in names if label):
         places = [folder / name, folder / "jobs" / name / "results", folder / name / "results"]
         tables = [folder / f"{name}{ending}" for ending in ENDINGS]
-        for path in (*(one / RECORD for one in places), *tables):
+        for path in (*(place / RECORD for place in places), *tables):
             if path.is_file():
                 return path
     text = message(

@@ -57,7 +57,7 @@ def opened_folder(out):
 
 def _clear(jobs):
     """Put right what an ended batch was writing."""
-    for place in (jobs, *(one for one in jobs.iterdir() if one.is_dir())):
+    for place in (jobs, *(folder for folder in jobs.iterdir() if folder.is_dir())):
         folders.recover(place)
         for left in place.glob(".*.tmp"):
             left.unlink(missing_ok=True)
@@ -103,10 +103,10 @@ class Journal:
             with open(self.out / JOURNAL, encoding="utf-8", errors="replace") as file:
                 for line in file:
                     try:
-                        found = json.loads(line)
+                        entry = json.loads(line)
                     except ValueError:  # cut off by a kill
                         continue
-                    if isinstance(found, dict):
-                        yield found
+                    if isinstance(entry, dict):
+                        yield entry
         except OSError:
             return

@@ -66,8 +66,8 @@ class Outcome:
 
     def status(self, steps):
         """The worst of some steps; one that was not come to counts for nothing."""
-        found = [self.steps[one].status for one in steps if one in self.steps]
-        return max(found, key=STATUSES.index, default="failed")
+        statuses = [self.steps[step].status for step in steps if step in self.steps]
+        return max(statuses, key=STATUSES.index, default="failed")
 
     def is_settled_for(self, keys):
         """Whether nothing is left to do of {step: key}."""
@@ -91,11 +91,17 @@ def load_outcome(out, name):
         saved = json.loads((folder / FILE).read_bytes())
         if saved.get("format") != FORMAT:
             return None
-        steps = {step: StepOutcome(**one) for step, one in saved["steps"].items() if step in STEPS}
+        steps = {
+            step: StepOutcome(**values) for step, values in saved["steps"].items() if step in STEPS
+        }
         if not (isinstance(saved["name"], str) and isinstance(saved["source"], str)):
             return None
-        whole = {step: one for step, one in steps.items() if is_step(one)}
-        there = {step: one for step, one in whole.items() if _has_its_files(folder, step, one)}
+        whole = {step: outcome for step, outcome in steps.items() if is_step(outcome)}
+        there = {
+            step: outcome
+            for step, outcome in whole.items()
+            if _has_its_files(folder, step, outcome)
+        }
         return Outcome(saved["name"], saved["source"], there)
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
@@ -119,7 +125,7 @@ def _has_its_files(folder, step, outcome):
 
 def save_outcome(out, outcome):
     """Write it to its folder, all or nothing."""
-    steps = {one: asdict(outcome.steps[one]) for one in STEPS if one in outcome.steps}
+    steps = {step: asdict(outcome.steps[step]) for step in STEPS if step in outcome.steps}
     saved = {"format": FORMAT, "name": outcome.name, "source": outcome.source, "steps": steps}
     folder = folder_of(out, outcome.name)
     folder.mkdir(parents=True, exist_ok=True)
@@ -143,10 +149,10 @@ def known_names(out):
     """{source: name} of the jobs that a batch's folder has."""
     names = {}
     try:
-        found = sorted(one.name for one in (Path(out) / JOBS).iterdir())
+        folder_names = sorted(folder.name for folder in (Path(out) / JOBS).iterdir())
     except OSError:
         return names
-    for name in found:
+    for name in folder_names:
         outcome = load_outcome(out, name)
         if outcome is not None and outcome.name == name:
             names[outcome.source] = name

@@ -15,8 +15,8 @@ def values_of(step, folder):
     saved = next((folder / name for name in SAVED if (folder / name).is_file()), None)
     if saved is None:
         return {}, []
-    found = json.loads(saved.read_bytes())
-    return _READERS[saved.name](found), found["warnings"]
+    results = json.loads(saved.read_bytes())
+    return _READERS[saved.name](results), results["warnings"]
 
 
 def _of_record(record):
@@ -39,19 +39,19 @@ def _of_record(record):
     return values
 
 
-def _of_comparison(found):
-    last = found["waterfall"][-1] if found["waterfall"] else None
+def _of_comparison(comparison):
+    last = comparison["waterfall"][-1] if comparison["waterfall"] else None
     return {
-        "comparison_verdict": found["verdict"] or "none",
+        "comparison_verdict": comparison["verdict"] or "none",
         "former_m3": last and last["former_m3"],
         "of_tank_m3": last and last["tank_m3"],
     }
 
 
-def _of_inspection(found):
-    counts = Counter(one["verdict"] for one in found["checks"])
-    worst = next((one for one in VERDICTS if counts[one]), None)
-    return {"tank": found["tank"]["id"], "inspection_verdict": worst}
+def _of_inspection(inspection):
+    counts = Counter(check["verdict"] for check in inspection["checks"])
+    worst = next((verdict for verdict in VERDICTS if counts[verdict]), None)
+    return {"tank": inspection["tank"]["id"], "inspection_verdict": worst}
 
 
 _READERS = dict(zip(SAVED, (_of_record, _of_comparison, _of_inspection), strict=True))

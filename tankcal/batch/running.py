@@ -144,9 +144,9 @@ def _unsettled(jobs, journal, batch, telling):
         except OSError as error:
             text = message("batch_input_unreadable", "cannot be read ({reason})",
                            reason=reason_of(error))  # fmt: skip
-            found = fail_job(task, Problem(str(error.filename or job.source), text))
-            batch.counts[found[0]] += 1
-            telling.ended(job.name, *found)
+            failure = fail_job(task, Problem(str(error.filename or job.source), text))
+            batch.counts[failure[0]] += 1
+            telling.ended(job.name, *failure)
             continue
         known = load_outcome(journal.out, job.name)
         if known is not None and known.is_settled_for(task.keys):
@@ -160,9 +160,9 @@ def _unsettled(jobs, journal, batch, telling):
 
 
 def _tell_known(outcome, job, status, telling):
-    steps = [outcome.steps[one] for one in job.asked.do if one in outcome.steps]
-    problems = [one for step in steps for one in step.problems]
-    telling.ended(job.name, status, problems[:1], sum(one.problem_count for one in steps))
+    steps = [outcome.steps[step] for step in job.asked.do if step in outcome.steps]
+    problems = [problem for step in steps for problem in step.problems]
+    telling.ended(job.name, status, problems[:1], sum(step.problem_count for step in steps))
 
 
 def _do(waiting, journal, batch, telling, workers, worker_bytes):
@@ -236,10 +236,10 @@ class _ByWorkers:
             error = future.exception()
             if error is not None and not isinstance(error, KilledWorker):
                 raise error
-            found = None if error else future.result()
+            result = None if error else future.result()
             future.release()
-        if found is not None:
-            self._tell_ended(task, *found)
+        if result is not None:
+            self._tell_ended(task, *result)
         elif self._is_tried_again(task):
             self._submit(task)
         else:
@@ -267,6 +267,6 @@ def fail_job(task, problem):
     step = next(
         one for one in task.job.asked.do if not known.is_settled(one, task.keys.get(one, ""))
     )
-    made = StepOutcome(task.keys.get(step, ""), "failed", problems=[plain], problem_count=1)
-    save_outcome(task.out, replace(known, steps={**known.steps, step: made}))
+    outcome = StepOutcome(task.keys.get(step, ""), "failed", problems=[plain], problem_count=1)
+    save_outcome(task.out, replace(known, steps={**known.steps, step: outcome}))
     return "failed", [plain], 1

@@ -49,7 +49,7 @@ def write_summary(out, jobs, language):
         rows.append(row)
     names = {row["name"] for row in rows}
     steps = dict.fromkeys(step for job in jobs for step in job.asked.do)
-    found = {
+    summary = {
         "format": "tankcal-batch/1",
         "tankcal": tankcal.__version__,
         "do": [*steps],
@@ -57,7 +57,7 @@ def write_summary(out, jobs, language):
         "gone": sorted(set(former or ()) - names),
     }
     with tempfile.TemporaryDirectory(prefix=".tankcal-", dir=out / JOBS) as folder:
-        files = summary_files(found, language, Path(folder))
+        files = summary_files(summary, language, Path(folder))
         for name in files:
             (Path(folder) / name).replace(out / name)
     return rows, [out / name for name in files]
@@ -86,16 +86,16 @@ def _row(out, job):
         warnings += done.warnings[:MOST_TOLD]
         counts[0] += done.problem_count
         counts[1] += done.warning_count
-        papers += [f"{JOBS}/{job.name}/{FOLDERS[step]}/{one}" for one in done.files]
+        papers += [f"{JOBS}/{job.name}/{FOLDERS[step]}/{name}" for name in done.files]
     if outcome is not None:
         row["status"] = outcome.status(steps)
-    best = [one for name in PAPERS for one in papers if one.endswith(f"/{name}")]
+    best = [paper for name in PAPERS for paper in papers if paper.endswith(f"/{name}")]
     return row | {
         "problems": problems[:MOST_TOLD],
         "problem_count": counts[0],
         "warnings": warnings[:MOST_TOLD],
         "warning_count": counts[1],
-        "papers": [*best, *(one for one in papers if one not in best)][:1],
+        "papers": [*best, *(paper for paper in papers if paper not in best)][:1],
     }
 
 
@@ -129,7 +129,7 @@ def changes_of(row, former):
             changes.append({"code": key, "old": old, "new": new})
     if former.get("height_m") != row.get("height_m"):
         changes.append({"code": "height_m"})
-    volumes = [one.get("volume_m3") for one in (former, row)]
+    volumes = [summary_row.get("volume_m3") for summary_row in (former, row)]
     if None not in volumes and volumes[0] != volumes[1]:
         most = max(former.get("U_m3") or 0.0, row.get("U_m3") or 0.0)
         changes.append({"code": "volume_m3", "by_m3": volumes[1] - volumes[0], "U_m3": most})

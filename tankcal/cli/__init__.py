@@ -131,7 +131,7 @@ def _options(arguments):
     """Parsed arguments; names that come after options are names, too."""
     parser = _parser()
     options, rest = parser.parse_known_args(arguments)
-    if rest and (not hasattr(options, "names") or any(one.startswith("-") for one in rest)):
+    if rest and (not hasattr(options, "names") or any(word.startswith("-") for word in rest)):
         parser.error(argparse._("unrecognized arguments: %s") % " ".join(rest))
     if rest:
         options.names = [*options.names, *rest]

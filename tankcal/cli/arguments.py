@@ -125,7 +125,7 @@ def parse_cluster(text):
 
 def parse_dips(text):
     """Dips in metres with commas between, not below 0."""
-    values = [_number(one) for one in text.split(",")]
+    values = [_number(part) for part in text.split(",")]
     if not all(0 <= value < float("inf") for value in values):
         raise refuse_argument(
             message(

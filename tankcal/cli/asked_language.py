@@ -25,12 +25,12 @@ def asked_language(path):
         if (path / WORKBOOK_FILE).is_file() and not (path / SETTINGS_FILE).is_file():
             path /= WORKBOOK_FILE
         if path.suffix.lower() == ".xlsx":
-            given = _in_workbook(path, log)
+            code = _in_workbook(path, log)
         else:
-            given = _in_settings(path / SETTINGS_FILE if path.is_dir() else path, log)
+            code = _in_settings(path / SETTINGS_FILE if path.is_dir() else path, log)
     except (OSError, ValueError):
         return None
-    return nearest_language(given)
+    return nearest_language(code)
 
 
 def asked_of_plan(path):
@@ -78,8 +78,8 @@ def _in_workbook(path, log):
     for sheet in sheets:
         rows, _ = table_rows(sheet.title, sheet.grid, log)
         headings = rows[0][1] if rows else []
-        if {SECTION, KEY, VALUE} <= {one for one in headings if isinstance(one, str)}:
-            place = [headings.index(one) for one in (SECTION, KEY, VALUE)]
+        if {SECTION, KEY, VALUE} <= {heading for heading in headings if isinstance(heading, str)}:
+            place = [headings.index(heading) for heading in (SECTION, KEY, VALUE)]
             for _, cells in rows[1:]:
                 section, key, value = (cells[position] for position in place)
                 if (section, key) == ("table", "language"):

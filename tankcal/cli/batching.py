@@ -119,16 +119,16 @@ def _batch(options):
             for name in ("language", "letterhead", "former", "compare_by", "inspect_by", "profile")
         },
     )
-    told = _Told(options.quiet or options.machine, options.machine)
+    progress = _BatchProgress(options.quiet or options.machine, options.machine)
     workers = options.cluster or (options.workers if options.workers is not None else "local")
     try:
         batch = run_batch(
             options.names, asked.absolute(), options.out, workers=workers,
             worker_bytes=int(options.worker_memory * GIGABYTE), language=language_of_run(),
-            telling=told,
+            telling=progress,
         )  # fmt: skip
     except KeyboardInterrupt as stop:
-        told.show.end()
+        progress.show.end()
         complain(
             message(
                 "batch_stopped",
@@ -138,9 +138,9 @@ def _batch(options):
         )
         return stopped_status(stop)
     except TankcalError:
-        told.show.end()
+        progress.show.end()
         raise
-    told.show.end()
+    progress.show.end()
     if options.machine:
         print_json(
             exit_status=batch.exit_status, out=options.out, jobs=batch.total,
@@ -152,7 +152,7 @@ def _batch(options):
     return batch.exit_status
 
 
-class _Told:
+class _BatchProgress:
     """Progress, and one line for each job that is not done."""
 
     def __init__(self, quiet, machine):

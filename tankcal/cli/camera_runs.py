@@ -35,14 +35,16 @@ def parameters(options):
     of = {"camera": options.camera, "photo": options.photo}
     job, record = None, _record_of(options.source)
     if record is not None:
-        found = analyse_record(record, choices, **of)
+        analyses = analyse_record(record, choices, **of)
     else:
         job = _load(options.source, show, options.language)
         if job.measurements is not None:
             _refuse_several(options, sets_to_be(job.measurements, **of))
-        found = analyse_job(job, choices, **of, dropping=not options.no_trials, progress=show.part)
+        analyses = analyse_job(
+            job, choices, **of, dropping=not options.no_trials, progress=show.part
+        )
     paths = [] if job is not None else [options.source]
-    _finish([as_json(one) for one in found], options, show, paths, job, record)
+    _finish([as_json(analysis) for analysis in analyses], options, show, paths, job, record)
 
 
 def compare(options):
@@ -59,7 +61,7 @@ def compare(options):
     pixel_um = options.pixel_um
     cameras = read_cameras(options.cameras, warnings.append, in_pixels=pixel_um is None)
     name = Path(options.cameras).name
-    found = compared(
+    comparison = compared(
         choose(with_pixels(cameras, pixel_um), options.names, name),
         options.method,
         grid=None if options.grid is None else parse(options.grid),
@@ -70,7 +72,7 @@ def compare(options):
         file=name,
     )
     warn(warnings)
-    _finish([as_json(found)], options, show, [options.cameras], printed=summary(found))
+    _finish([as_json(comparison)], options, show, [options.cameras], printed=summary(comparison))
 
 
 def influence(options):
@@ -84,7 +86,7 @@ def influence(options):
     warnings = []
     calibrations = read_cameras(options.cameras, warnings.append, in_pixels=False)
     job = _load(options.job, show, options.language)
-    found = influence_of(
+    effects = influence_of(
         job,
         calibrations,
         states=options.states,
@@ -93,7 +95,7 @@ def influence(options):
         file=Path(options.cameras).name,
     )
     warn(warnings)
-    _finish([as_json(found)], options, show, [options.cameras], job)
+    _finish([as_json(effects)], options, show, [options.cameras], job)
 
 
 def check(options):
@@ -117,10 +119,12 @@ def check(options):
         job = _load(options.source, show, options.language)
         differences = differences_of(tankcal.adjust_job(job, show.step))
     axes, values = differences.of_known_axes()
-    found = check_product(values, axes, names=differences.names, limits=table, alpha=options.alpha)
+    checked = check_product(
+        values, axes, names=differences.names, limits=table, alpha=options.alpha
+    )
     paths = [] if job is not None else [options.source]
     paths += [options.limits] if options.limits else []
-    _finish([as_json(found)], options, show, paths, job, record)
+    _finish([as_json(checked)], options, show, paths, job, record)
 
 
 def convert(options):
@@ -142,7 +146,10 @@ def convert(options):
                 "convert_in_form", "{name}, in the form of {form}", name=name, form=options.form
             )
             _tell_error(what, camera)
-    sds = [None if one is None else np.sqrt(np.maximum(np.diag(one), 0.0)) for one in covariances]
+    sds = [
+        None if covariance is None else np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        for covariance in covariances
+    ]
     file = Path(options.file).name
     written = write_camera(options.to, cameras, sds, options.radius_mm, file)
     if options.to != "cameras.toml":
@@ -159,11 +166,11 @@ def _in_form(form, cameras, covariances):
     """[(name, FramedCamera)] in the form of a publication, and their covariances or None."""
     from tankcal.camera.formats.published import camera_in_form
 
-    found = [
+    converted = [
         (name, *camera_in_form(camera, form, covariance))
         for (name, camera), covariance in zip(cameras, covariances, strict=True)
     ]
-    return [(name, camera) for name, camera, _ in found], [after for *_, after in found]
+    return [(name, camera) for name, camera, _ in converted], [after for *_, after in converted]
 
 
 def _cameras_of(options):
@@ -191,8 +198,8 @@ def _registered(path, pixel_um):
     from tankcal.job.calibrations import read_cameras, with_pixels
 
     setups = with_pixels(read_cameras(path, in_pixels=False), pixel_um)
-    cameras = [(one.camera.name, _framed(one)) for one in setups]
-    return cameras, [np.diag(one.camera.sd**2) for one in setups]
+    cameras = [(setup.camera.name, _framed(setup)) for setup in setups]
+    return cameras, [np.diag(setup.camera.sd**2) for setup in setups]
 
 
 def _framed(setup):
@@ -266,23 +273,23 @@ def read(options):
         bit_errors=options.bit_errors,
         encoding=options.encoding,
     )
-    found = read_photographs(options.photos, options.out, wanted, options.replace, show.part)
+    result = read_photographs(options.photos, options.out, wanted, options.replace, show.part)
     show.end()
-    warn(found.warnings)
-    refused = sum(found.refused.values())
-    reasons = ", ".join(f"{code} {count}" for code, count in sorted(found.refused.items()))
+    warn(result.warnings)
+    refused = sum(result.refused.values())
+    reasons = ", ".join(f"{code} {count}" for code, count in sorted(result.refused.items()))
     say(
         message(
             "targets_read",
             "{targets}, {points} in {photos}; refused: {refused}{reasons}",
-            targets=_targets(found.targets),
-            points=_image_points(found.points),
-            photos=_photos(len(found.photos)),
+            targets=_targets(result.targets),
+            points=_image_points(result.points),
+            photos=_photos(len(result.photos)),
             refused=refused,
             reasons=f" ({reasons})" if refused else "",
         )
     )
-    print(f"  {printable(found.path)}\n  {printable(found.refused_path)}")
+    print(f"  {printable(result.path)}\n  {printable(result.refused_path)}")
 
 
 def _targets(count):

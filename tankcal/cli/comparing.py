@@ -77,36 +77,36 @@ def _compare(options):
         options.old, options.new, former=options.former, new_former=options.new_former,
         courses=options.courses, rule=options.rule,
     )  # fmt: skip
-    found = plain_of_comparison(compare_files(asked))
+    comparison = plain_of_comparison(compare_files(asked))
     written = ()
     if options.out is not None:
-        written = write_comparison(found, options.out, language_of_run(), show.step)
+        written = write_comparison(comparison, options.out, language_of_run(), show.step)
     show.end()
-    print_saved(options, found, _tell, written)
+    print_saved(options, comparison, _tell, written)
 
 
-def _tell(found):
+def _tell(comparison):
     """Warnings, what makes up the difference, the verdict and its reasons."""
     from tankcal.report.comparison import ComparisonPaper
 
-    paper = ComparisonPaper(found, language_of_run())
-    warn(paper.warning(one) for one in found["warnings"][:MOST_WARNINGS])
-    say(_sides(found))
-    say(_sum(found["waterfall"][-1]))
-    say(_verdict(found, paper))
-    for one in found["reasons"]:
-        say(f"  {paper.reason(one)}")
+    paper = ComparisonPaper(comparison, language_of_run())
+    warn(paper.warning(warning) for warning in comparison["warnings"][:MOST_WARNINGS])
+    say(_sides(comparison))
+    say(_sum(comparison["waterfall"][-1]))
+    say(_verdict(comparison, paper))
+    for reason in comparison["reasons"]:
+        say(f"  {paper.reason(reason)}")
 
 
-def _sides(found):
+def _sides(comparison):
     return message(
         "compare_sides",
         "{former} compared with {new}: {rows} rows from {low} to {high} m",
-        former=found["former"]["name"],
-        new=found["new"]["name"],
-        rows=len(found["rows"]["height_m"]),
-        low=_plain(found["low_m"]),
-        high=_plain(found["high_m"]),
+        former=comparison["former"]["name"],
+        new=comparison["new"]["name"],
+        rows=len(comparison["rows"]["height_m"]),
+        low=_plain(comparison["low_m"]),
+        high=_plain(comparison["high_m"]),
     )
 
 
@@ -117,15 +117,15 @@ def _sum(column):
         "at {dip} m, m3: former {former}, zero {zero}, temperature {temperature}, head {head}, "
         "roof {roof}, rounding {rounding}, the tank itself {tank}, new {new}",
         dip=_plain(column["height_m"]),
-        **{one: _signed(column[f"{one}_m3"], one not in ("former", "new")) for one in names},
+        **{name: _signed(column[f"{name}_m3"], name not in ("former", "new")) for name in names},
     )
 
 
-def _verdict(found, paper):
+def _verdict(comparison, paper):
     return message(
         "compare_verdict",
         "verdict: {verdict} ({rule})",
-        verdict=paper.word(f"verdicts.{found['verdict'] or 'none'}"),
+        verdict=paper.word(f"verdicts.{comparison['verdict'] or 'none'}"),
         rule=paper.found["rule"]["name"],
     )
 

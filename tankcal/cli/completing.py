@@ -87,16 +87,16 @@ def mark(parser, named):
     command = parser.prog.removeprefix("tankcal").strip()
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
-            for one in action.choices.values():
-                mark(one, named)
+            for command_parser in action.choices.values():
+                mark(command_parser, named)
             continue
         for option in action.option_strings or (action.dest,):
             if (command, option) in named:
                 action.complete = _names_or_toml(*named[command, option])
         if action.nargs != 0 and action.choices is None and not hasattr(action, "complete"):
-            found = _files_of(action)
-            if found is not None:
-                action.complete = found
+            files = _files_of(action)
+            if files is not None:
+                action.complete = files
 
 
 def _describe_by_their_lines(parser):
@@ -105,8 +105,8 @@ def _describe_by_their_lines(parser):
         if isinstance(action, argparse._SubParsersAction):
             for line in action._choices_actions:
                 action.choices[line.dest].description = line.help
-            for one in action.choices.values():
-                _describe_by_their_lines(one)
+            for command_parser in action.choices.values():
+                _describe_by_their_lines(command_parser)
 
 
 def _files_of(action):

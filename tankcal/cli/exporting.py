@@ -102,7 +102,7 @@ def _refuse_missing(options):
         "missing; expected a profile that tankcal export --list shows, or a .toml file",
     )
     needed = (("RECORD", options.record, record), ("--profile", options.profile, profile))
-    missing = [Problem(name, text) for name, given, text in needed if given is None]
+    missing = [Problem(name, text) for name, value, text in needed if value is None]
     if missing:
         raise InputError(missing)
 
@@ -135,10 +135,19 @@ def _list(options):
 
     profiles = shipped_profiles()
     if options.machine:
-        print_json(exit_status=0, profiles=[
-            {"profile": code, "name": one.name, "max_points": one.max_points,
-             "verified": one.verified, "source": one.source} for code, one in profiles.items()
-        ])  # fmt: skip
+        print_json(
+            exit_status=0,
+            profiles=[
+                {
+                    "profile": code,
+                    "name": profile.name,
+                    "max_points": profile.max_points,
+                    "verified": profile.verified,
+                    "source": profile.source,
+                }
+                for code, profile in profiles.items()
+            ],
+        )
         return 0
     for code, one in profiles.items():
         points = message("export_any_points", "any number of rows")

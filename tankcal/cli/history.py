@@ -76,7 +76,7 @@ def _history(options):
 
         refuse_foreign(options.out)
     show = Progress(options.quiet or options.machine)
-    found = plain_of_history(
+    history = plain_of_history(
         history_of_files(
             options.sources,
             tanks=options.tank,
@@ -87,31 +87,31 @@ def _history(options):
     )
     written = ()
     if options.out is not None:
-        written = write_history(found, options.out, language_of_run(), show.step)
+        written = write_history(history, options.out, language_of_run(), show.step)
     show.end()
-    print_saved(options, found, _tell, written)
+    print_saved(options, history, _tell, written)
 
 
-def _tell(found):
+def _tell(history):
     """Warnings, then a line for each certificate, change and inspection."""
     from tankcal.report.history import HistoryPaper
 
-    paper = HistoryPaper(found, language_of_run())
-    warn(paper.warning(one) for one in found["warnings"][:MOST_SHOWN])
-    for one in found["left_out"][:MOST_SHOWN]:
-        say(message("history_left_out", "not in the history: {text}", text=paper.warning(one)))
-    say(_span(found))
-    for one in found["certificates"]:
-        say(_certificate(one))
-    for one in found["changes"]:
-        say(_change(one, paper))
-    for one in found["inspections"]:
-        say(_inspection(one))
+    paper = HistoryPaper(history, language_of_run())
+    warn(paper.warning(warning) for warning in history["warnings"][:MOST_SHOWN])
+    for omission in history["left_out"][:MOST_SHOWN]:
+        say(message("history_left_out", "not in the history: {text}", text=paper.warning(omission)))
+    say(_span(history))
+    for certificate in history["certificates"]:
+        say(_certificate(certificate))
+    for change in history["changes"]:
+        say(_change(change, paper))
+    for inspection in history["inspections"]:
+        say(_inspection(inspection))
 
 
-def _span(found):
-    certificates = found["certificates"]
-    tank = found["tank"] or certificates[-1]["file"]
+def _span(history):
+    certificates = history["certificates"]
+    tank = history["tank"] or certificates[-1]["file"]
     if len(certificates) == 1:
         return message(
             "history_one", "{tank}: 1 certificate, {date}", tank=tank, date=certificates[0]["date"]
@@ -126,45 +126,47 @@ def _span(found):
     )
 
 
-def _certificate(one):
+def _certificate(certificate):
     U = ""
-    if one["U_top_m3"] is not None:
-        U = message("history_U", ", U = {uncertainty} m3", uncertainty=_volume(one["U_top_m3"]))
+    if certificate["U_top_m3"] is not None:
+        U = message(
+            "history_U", ", U = {uncertainty} m3", uncertainty=_volume(certificate["U_top_m3"])
+        )
     return message(
         "history_row",
         "  {number}  {date}  {volume} m3 at {dip} m{uncertainty}  {name}",
-        number=one["certificate"],
-        date=one["date"],
-        volume=_volume(one["top_volume_m3"]),
-        dip=_dip(one["top_dip_m"]),
+        number=certificate["certificate"],
+        date=certificate["date"],
+        volume=_volume(certificate["top_volume_m3"]),
+        dip=_dip(certificate["top_dip_m"]),
         uncertainty=U,
-        name=one["number"] or one["file"],
+        name=certificate["number"] or certificate["file"],
     )
 
 
-def _change(one, paper):
-    E_n, d = one["worst_E_n"], one["top_d_m3"]
+def _change(change, paper):
+    E_n, d = change["worst_E_n"], change["top_d_m3"]
     return message(
         "history_change",
         "  {former} to {new}: {d} m3 at {dip} m, worst E_n {E_n}, {verdict}",
-        former=one["former"],
-        new=one["new"],
+        former=change["former"],
+        new=change["new"],
         d=("+" if d > 0 else "") + _volume(d),
-        dip=_dip(one["high_m"]),
+        dip=_dip(change["high_m"]),
         E_n=NOTHING if E_n is None else fixed(E_n, 2, marks()),
-        verdict=paper.words["verdicts"].get(one["verdict"] or "", NOTHING),
+        verdict=paper.words["verdicts"].get(change["verdict"] or "", NOTHING),
     )
 
 
-def _inspection(one):
-    passed = sum(check["verdict"] == "passed" for check in one["checks"])
+def _inspection(inspection):
+    passed = sum(check["verdict"] == "passed" for check in inspection["checks"])
     return message(
         "history_inspected",
         "  inspection of {date}: {passed} of {count} checks passed  {name}",
-        date=one["date"] or NOTHING,
+        date=inspection["date"] or NOTHING,
         passed=passed,
-        count=len(one["checks"]),
-        name=one["file"],
+        count=len(inspection["checks"]),
+        name=inspection["file"],
     )
 
 

@@ -159,20 +159,20 @@ def _import(options):
         codes=options.codes,
         station_code=options.station_code,
     )
-    found = import_fieldbooks(options.names, options.out, choices, replace_tables=options.replace)
+    result = import_fieldbooks(options.names, options.out, choices, replace_tables=options.replace)
     if options.machine:
         print_json(
             exit_status=0,
-            summary=list(map(str, found.summary)),
-            warnings=[problem_of(one) for one in found.warnings],
-            files=list(map(str, found.paths)),
+            summary=list(map(str, result.summary)),
+            warnings=[problem_of(warning) for warning in result.warnings],
+            files=list(map(str, result.paths)),
         )
         return None
-    for line in found.summary:
+    for line in result.summary:
         say(line)
-    warn(found.warnings)
+    warn(result.warnings)
     survey = "total-station" if options.no_hits else "wall-hits"
-    say_written(Path(options.out), found.paths, survey)
+    say_written(Path(options.out), result.paths, survey)
     return None
 
 
@@ -204,8 +204,8 @@ def _list_of(options):
     from tankcal.fieldbooks import lists
     from tankcal.fieldbooks.detection import is_field_book
 
-    path, given = Path(options.names[0]), dict(map(_column, options.column))
-    is_named = bool(options.table or given)
+    path, stated = Path(options.names[0]), dict(map(_column, options.column))
+    is_named = bool(options.table or stated)
     if not is_named and (path.suffix.lower() not in LISTS or not path.is_file()):
         return None
     name = options.table or (path.stem if lists.is_table(path.stem) else "points")
@@ -216,15 +216,15 @@ def _list_of(options):
     if not is_named and (path.stat().st_size > lists.MAX_BYTES or is_field_book(path.read_bytes())):
         return None
     try:
-        found = lists.read_list(path, Path(options.out), name, given)
+        foreign_list = lists.read_list(path, Path(options.out), name, stated)
     except InputError:
         if is_named:
             raise
         return None  # the reader of field books refuses it
     # at least one needed column beside the name of the point is recognised
-    unknown = {one.name for one in found.missing} - {"point"}
+    unknown = {field_.name for field_ in foreign_list.missing} - {"point"}
     is_list = len(unknown) < sum(field.required for field in lists.COLUMNS[name]) - 1
-    return found if is_named or is_list else None
+    return foreign_list if is_named or is_list else None
 
 
 def _column(text):

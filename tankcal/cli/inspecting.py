@@ -91,20 +91,20 @@ def _inspect(options):
         edges=options.edges,
         yield_pa=None if options.yield_mpa is None else 1e6 * options.yield_mpa,
     )
-    found = plain_of_inspection(inspect_files(asked, show.step, show.part))
+    inspection = plain_of_inspection(inspect_files(asked, show.step, show.part))
     written = ()
     if options.out is not None:
-        written = write_inspection(found, options.out, language_of_run(), show.step)
+        written = write_inspection(inspection, options.out, language_of_run(), show.step)
     show.end()
-    print_saved(options, found, _tell, written)
+    print_saved(options, inspection, _tell, written)
 
 
-def _tell(found):
+def _tell(inspection):
     """Warnings, the rule, then a line for each check."""
     from tankcal.report.inspection import InspectionPaper
 
-    paper = InspectionPaper(found, language_of_run())
-    warn(paper.warning(one) for one in found["warnings"][:MOST_WARNINGS])
+    paper = InspectionPaper(inspection, language_of_run())
+    warn(paper.warning(warning) for warning in inspection["warnings"][:MOST_WARNINGS])
     rule = paper.found["rule"]
     say(message("inspect_by", "rule: {rule} ({file})", rule=rule["name"], file=rule["file"]))
     if not rule["verified"]:
@@ -115,22 +115,22 @@ def _tell(found):
                 remark=rule["remark"],
             )
         )
-    for one in found["checks"]:
-        say(_line(paper, one))
+    for check in inspection["checks"]:
+        say(_line(paper, check))
 
 
-def _line(paper, one):
+def _line(paper, check):
     """One check: its name, the value with U, the limit, the verdict, where it is."""
-    name, verdict = paper.check_name(one["code"]), paper.verdict(one)
-    if one["value"] is None:
-        return f"{name}: {paper.remark(one) or verdict}"
+    name, verdict = paper.check_name(check["code"]), paper.verdict(check)
+    if check["value"] is None:
+        return f"{name}: {paper.remark(check) or verdict}"
     values = {
         "check": name,
-        "value": paper.value(one),
-        "U": paper.in_unit(one, one["U"]) or "?",
-        "limit": paper.limit(one) or "-",
+        "value": paper.value(check),
+        "U": paper.in_unit(check, check["U"]) or "?",
+        "limit": paper.limit(check) or "-",
         "verdict": verdict,
-        "place": paper.place(one),
+        "place": paper.place(check),
     }
     return message(
         "inspect_check", "{check}: {value}, U {U}, limit {limit}: {verdict} ({place})", **values

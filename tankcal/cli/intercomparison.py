@@ -173,12 +173,12 @@ def _make(options):
     out = Path(options.directory)
     _refuse_existing(out)
     show = Progress(options.quiet)
-    methods = [one for one in METHODS if one in options.methods]
+    methods = [method for method in METHODS if method in options.methods]
     secret = options.secret or secrets.token_hex(32)
-    made = make_package(options.tanks, options.seed, methods, secret=secret, progress=show.part)
+    package = make_package(options.tanks, options.seed, methods, secret=secret, progress=show.part)
     with replaced(out) as folder:
-        write_files(folder / "package", made.files)
-        write_files(folder / "sealed", {TRUTH.file: made.truth})
+        write_files(folder / "package", package.files)
+        write_files(folder / "sealed", {TRUTH.file: package.truth})
         if options.practice:
             practice = make_package(
                 options.practice, options.seed, methods, is_open=True, progress=show.part
@@ -221,9 +221,9 @@ def _answer(options):
     _refuse_existing(options.out)
     manifest = _package(options.package)
     show = Progress(options.quiet)
-    saved, told = answer_package(options.package, manifest, show.part)
+    saved, warnings = answer_package(options.package, manifest, show.part)
     show.end()
-    warn(told)
+    warn(warnings)
     files = answer_files(saved)
     with replaced(options.out) as folder:
         write_files(folder, files)
@@ -243,12 +243,12 @@ def _score(options):
     show = Progress(options.quiet or options.machine)
     show.step(message("ic_scoring", "scoring answers (folders: {count})",
                       count=len(options.names)))  # fmt: skip
-    found = plain_of(score_folders(options.names, options.truth, options.package))
+    scores = plain_of(score_folders(options.names, options.truth, options.package))
     written = ()
     if options.out is not None:
-        written = write_scores(found, options.out, language_of_run(), show.step)
+        written = write_scores(scores, options.out, language_of_run(), show.step)
     show.end()
-    print_saved(options, found, _tell, written)
+    print_saved(options, scores, _tell, written)
 
 
 def _refuse_existing(out):
@@ -269,23 +269,23 @@ def _package(folder):
     return manifest
 
 
-def _tell(found):
+def _tell(scores):
     """Warnings, then a line for each participant and method."""
     from tankcal.report.scores import ScoresPaper
 
-    paper = ScoresPaper(found, language_of_run())
-    warn(paper.warning(one) for one in found["warnings"][:MOST_WARNINGS])
-    for one in found["methods"]:
+    paper = ScoresPaper(scores, language_of_run())
+    warn(paper.warning(warning) for warning in scores["warnings"][:MOST_WARNINGS])
+    for score in scores["methods"]:
         values = {
-            "who": paper.participant(one),
-            "method": paper.method(one["method"]),
-            "tables": one["tables"],
-            "asked": one["asked"],
-            "rms": _ppm(one["rms_top_ppm"]),
-            "U": _ppm(one["mean_U_ppm"]),
-            "within": one["tops_within"],
-            "judged": one["tops_judged"],
-            "zeta": NOTHING if one["rms_zeta"] is None else fixed(one["rms_zeta"], 2, marks()),
+            "who": paper.participant(score),
+            "method": paper.method(score["method"]),
+            "tables": score["tables"],
+            "asked": score["asked"],
+            "rms": _ppm(score["rms_top_ppm"]),
+            "U": _ppm(score["mean_U_ppm"]),
+            "within": score["tops_within"],
+            "judged": score["tops_judged"],
+            "zeta": NOTHING if score["rms_zeta"] is None else fixed(score["rms_zeta"], 2, marks()),
         }
         say(
             message(

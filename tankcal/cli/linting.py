@@ -95,7 +95,9 @@ def _warnings(count):
 
 
 def _plain(report):
-    findings = [{"severity": one.severity, **problem_of(one.problem)} for one in report.findings]
+    findings = [
+        {"severity": finding.severity, **problem_of(finding.problem)} for finding in report.findings
+    ]
     return {
         "errors": report.errors,
         "warnings": len(report.findings) - report.errors,

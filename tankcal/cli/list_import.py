@@ -15,18 +15,18 @@ from tankcal.messages import message, printable
 NO = ("n", "no", "nao", "não")
 
 
-def import_list(found, options):
+def import_list(foreign_list, options):
     """Show what the headings of a ForeignList mean, ask, and write it; returns the exit status."""
     is_asked = sys.stdin.isatty() and sys.stdout.isatty() and not (options.yes or options.machine)
     folder = Path(options.out)
     if is_asked:
-        found = _ask_missing(found)
-    lines = _lines(found, folder)
+        foreign_list = _ask_missing(foreign_list)
+    lines = _lines(foreign_list, folder)
     if not options.machine:
         for line in lines:
             say(line)
-        warn(found.warnings)
-    refuse_missing(found)
+        warn(foreign_list.warnings)
+    refuse_missing(foreign_list)
     if is_asked and not _is_confirmed():
         complain(
             message(
@@ -36,52 +36,52 @@ def import_list(found, options):
             )
         )
         return 2
-    paths = write_list(found, folder, replace=options.replace)
+    paths = write_list(foreign_list, folder, replace=options.replace)
     if options.machine:
         files = [str(path) for path in paths]
-        warnings = [problem_of(one) for one in found.warnings]
+        warnings = [problem_of(warning) for warning in foreign_list.warnings]
         print_json(
-            exit_status=0, summary=[str(one) for one in lines], warnings=warnings, files=files
+            exit_status=0, summary=[str(line) for line in lines], warnings=warnings, files=files
         )
         return 0
     say_written(folder, paths, None)
     return 0
 
 
-def _lines(found, folder):
+def _lines(foreign_list, folder):
     """What the list becomes: a line for each heading."""
     first = message(
         "list_becomes",
         "{file} becomes {table}.csv of {folder}:",
-        file=found.table.file,
-        table=found.name,
+        file=foreign_list.table.file,
+        table=foreign_list.name,
         folder=str(folder),
     )
     lines = [first]
-    for heading in found.table.headings:
-        one = found.meanings.get(heading)
+    for heading in foreign_list.table.headings:
+        meaning = foreign_list.meanings.get(heading)
         named = {"heading": heading}
-        if one is None:
+        if meaning is None:
             line = message("list_unused", "  {heading}: not used", **named)
-        elif one.factor == 1:
-            line = message("list_means", "  {heading} = {column}", column=one.column, **named)
+        elif meaning.factor == 1:
+            line = message("list_means", "  {heading} = {column}", column=meaning.column, **named)
         else:
             line = message(
                 "list_means_converted",
                 "  {heading} = {column}, converted from {unit}",
-                column=one.column,
-                unit=one.unit,
+                column=meaning.column,
+                unit=meaning.unit,
                 **named,
             )
         lines.append(line)
     return lines
 
 
-def _ask_missing(found):
+def _ask_missing(foreign_list):
     """The ForeignList with the headings that the user chooses for columns that it lacks."""
-    meanings = dict(found.meanings)
-    for field in found.missing:
-        free = [one for one in found.table.headings if one not in meanings]
+    meanings = dict(foreign_list.meanings)
+    for field in foreign_list.missing:
+        free = [one for one in foreign_list.table.headings if one not in meanings]
         if not free:
             break
         say(message("list_ask", "which heading is {column}?", column=field.name))
@@ -91,7 +91,7 @@ def _ask_missing(found):
         if answer.isdecimal() and 1 <= int(answer) <= len(free):
             heading = free[int(answer) - 1]
             meanings[heading] = stated_meaning(heading, field)
-    return replace(found, meanings=meanings)
+    return replace(foreign_list, meanings=meanings)
 
 
 def _is_confirmed():

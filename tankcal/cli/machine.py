@@ -26,15 +26,15 @@ def print_json(**values):
     print()
 
 
-def print_saved(options, found, tell, written):
+def print_saved(options, results, tell, written):
     """Print what a command found, told by tell(found) in lines of text, and which files it wrote.
 
     `written` are their paths below options.out; with `--json` one object is printed of `found`.
     """
     if options.machine:
-        print_json(exit_status=0, **found)
+        print_json(exit_status=0, **results)
         return
-    tell(found)
+    tell(results)
     if written:
         print_paths(Path(options.out), [path.name for path in written])
 
@@ -44,6 +44,6 @@ def failure(error):
     problems = error.problems if isinstance(error, InputError) else ()
     return {
         "exit_status": error.exit_status,
-        "problems": [problem_of(one) for one in problems],
+        "problems": [problem_of(problem) for problem in problems],
         "error": None if problems else str(error),
     }

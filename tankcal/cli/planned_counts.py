@@ -19,7 +19,7 @@ def plan_holds(plan, counts):
 
 def counted(kind, count):
     """That many of a kind, of KINDS."""
-    one, many = {
+    singular, plural = {
         "photographs": (
             message("plan_one_photograph", "{count} photograph", count=count),
             message("plan_photographs", "{count} photographs", count=count),
@@ -73,4 +73,4 @@ def counted(kind, count):
             message("plan_batches", "{count} batches", count=count),
         ),
     }[kind]
-    return one if count == 1 else many
+    return singular if count == 1 else plural

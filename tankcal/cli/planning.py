@@ -115,10 +115,10 @@ def _plan(options):
         )  # fmt: skip
     show.end()
     warn(prediction.warnings)
-    told = wall_summary(prediction) if is_wall else _summary(prediction)
+    summary = wall_summary(prediction) if is_wall else _summary(prediction)
     scatter = wall_scatter(simulated) if is_wall else _scatter(simulated)
-    found = (*told, *_verdict(prediction), *_changes(effects), *_design(path), *scatter)
-    for line in found:
+    lines = (*summary, *_verdict(prediction), *_changes(effects), *_design(path), *scatter)
+    for line in lines:
         say(line)
     if written:
         print_paths(Path(options.out), written)
@@ -182,16 +182,16 @@ def _remedies(plan, error, options, show):
 
     if not options.changes or not isinstance(error, SolutionError) or not isinstance(plan, Plan):
         return
-    found = what_would_do(plan, progress=show.part)
+    remedies = what_would_do(plan, progress=show.part)
     show.end()
-    if found:
+    if remedies:
         yield message("plan_remedies", "additions that would determine the survey, best first:")
-    for one in found[:SHOWN]:
+    for effect in remedies[:SHOWN]:
         yield message(
             "plan_remedy",
             "  {change}: U/V {relative}",
-            change=describe_change(one.change),
-            relative=_percent(one.relative_u),
+            change=describe_change(effect.change),
+            relative=_percent(effect.relative_u),
         )
 
 
@@ -257,12 +257,12 @@ def _verdict(prediction):
     """The top of the table, the worst delivery, and the limit."""
     plan = prediction.plan
     yield _top(prediction.table)
-    for one in prediction.tabled.stated.worst[:1]:
-        worst = one.relative
+    for delivery in prediction.tabled.stated.worst[:1]:
+        worst = delivery.relative
         yield message(
             "plan_worst",
             "worst delivery of {least:g} m or more: {low:g} to {high:g} m, U/V = {relative}",
-            least=one.minimum_m,
+            least=delivery.minimum_m,
             low=worst.low_m,
             high=worst.high_m,
             relative=_percent(worst.relative),
@@ -294,25 +294,25 @@ def _judged(limit, meets):
 
 def _first(points):
     """The first names of points, and that there are more."""
-    return ", ".join(one.name for one in points[:SHOWN]) + ", ..." * (len(points) > SHOWN)
+    return ", ".join(point.name for point in points[:SHOWN]) + ", ..." * (len(points) > SHOWN)
 
 
 def _changes(effects):
-    for one in effects[:SHOWN]:
-        if not one.why:
-            yield _effect(one)
+    for effect in effects[:SHOWN]:
+        if not effect.why:
+            yield _effect(effect)
     if len(effects) > SHOWN:
         yield message("plan_more_changes", "  more changes: {more}", more=len(effects) - SHOWN)
 
 
-def _effect(one):
+def _effect(effect):
     """One change; nothing is said of costs where the plan states none."""
     values = {
-        "change": describe_change(one.change),
-        "relative": _percent(one.relative_u),
-        "difference": 1e6 * one.difference,
+        "change": describe_change(effect.change),
+        "relative": _percent(effect.relative_u),
+        "difference": 1e6 * effect.difference,
     }
-    if not any(one.change.plan.costs.values()):
+    if not any(effect.change.plan.costs.values()):
         return message(
             "plan_effect_without_cost",
             "  {change}: U/V {relative} ({difference:+.1f} ppm)",
@@ -322,7 +322,7 @@ def _effect(one):
         "plan_effect",
         "  {change}: U/V {relative} ({difference:+.1f} ppm, cost {cost:+g})",
         **values,
-        cost=one.change.cost,
+        cost=effect.change.cost,
     )
 
 
@@ -363,7 +363,7 @@ def _item(item, name):
 def _design(path):
     if path is None:
         return
-    steps = [describe_change(one.change) for one in path.steps]
+    steps = [describe_change(step.change) for step in path.steps]
     yield message(
         "plan_smallest",
         "smallest design: {steps}",
@@ -393,20 +393,20 @@ def _design(path):
         yield message("plan_none_meets", "  no evaluated plan meets the limit")
 
 
-def _scatter(found):
-    if found is None:
+def _scatter(scatter):
+    if scatter is None:
         return
     yield message(
         "plan_scatter",
         "{runs} simulated surveys, ratio of scatter to prediction: coordinates {ratio:.3f}, "
         "volume {volume_ratio:.3f} (standard deviation {ratio_sd:.2g}); {aside:.1f} values "
         "rejected on average, without a solution: {failed}",
-        runs=found.runs,
-        ratio=found.ratio,
-        volume_ratio=found.volume_ratio,
-        ratio_sd=found.volume_ratio_sd,
-        aside=found.set_aside.mean(),
-        failed=len(found.failed),
+        runs=scatter.runs,
+        ratio=scatter.ratio,
+        volume_ratio=scatter.volume_ratio,
+        ratio_sd=scatter.volume_ratio_sd,
+        aside=scatter.set_aside.mean(),
+        failed=len(scatter.failed),
     )
 
 

@@ -124,13 +124,13 @@ def _print_doubts_of_job(job, show, tell):
 def _doubts_among(warnings):
     from tankcal.job.plausibility_table import CODES
 
-    return [one for one in warnings if getattr(one.expected, "code", None) in CODES]
+    return [warning for warning in warnings if getattr(warning.expected, "code", None) in CODES]
 
 
 def _tell(out, paths, warnings, result, adjustment):
     """Print warnings, a summary and the files; implausible inputs once more at the end."""
     doubts = _doubts_among(warnings)
-    warn(one for one in warnings if one not in doubts)
+    warn(warning for warning in warnings if warning not in doubts)
     if adjustment is not None:
         say(_summary(adjustment))
     if result is not None:
@@ -150,7 +150,7 @@ def _tell_machine(out, paths, warnings, result, adjustment):
         tank=None if result is None else result.job.tank.id,
         top=None if result is None else _top(result),
         adjustment=None if adjustment is None else _fit(adjustment),
-        warnings=[problem_of(one) for one in warnings],
+        warnings=[problem_of(warning) for warning in warnings],
     )
 
 
@@ -276,7 +276,7 @@ def _refuse_failed(adjustment):
     """Raise when there is an adjustment that is in doubt, or whose global test failed."""
     if adjustment is not None and adjustment.doubts:
         nothing = message("strict_nothing", "no file was written (--strict)")
-        raise SolutionError(*(one.text for one in adjustment.doubts), nothing)
+        raise SolutionError(*(doubt.text for doubt in adjustment.doubts), nothing)
     if adjustment is None or adjustment.redundancy <= 0:
         return
     test = adjustment.adjusted.test()
@@ -300,12 +300,12 @@ def _summary(adjustment):
     """One line: how well the survey fits, and how good its points are."""
     from tankcal.survey.network.quality import precision
 
-    removed = len({(one.kind, one.ids, one.row) for one in adjustment.removed})
+    removed = len({(removal.kind, removal.ids, removal.row) for removal in adjustment.removed})
     free = ~adjustment.fixed.all(axis=1)
     mean = ""
     if free.any():
-        found = precision(adjustment.xyz_m[free], adjustment.covariance_m2[free])
-        sd = format_significant(1000 * found.mean_sd_m, 3, marks())
+        quality = precision(adjustment.xyz_m[free], adjustment.covariance_m2[free])
+        sd = format_significant(1000 * quality.mean_sd_m, 3, marks())
         mean = message("mean_sd", ", mean standard deviation {sd} mm", sd=sd)
     return message(
         "adjusted",

@@ -16,21 +16,21 @@ def lines_set_aside(result, adjustment):
     kinds = [_readings(adjustment)]
     if result is not None:
         kinds = [_points(result), _straps(result), _offsets(result), *kinds]
-    for told in kinds:
-        names = list(dict.fromkeys(told.names))
+    for rejected in kinds:
+        names = list(dict.fromkeys(rejected.names))
         if len(names) > NAMED:
             yield message(
                 "set_aside_and_more",
                 "  {what}: {names} and {more} more (see the working papers)",
-                what=told.what,
+                what=rejected.what,
                 names=names[:NAMED],
                 more=len(names) - NAMED,
             )
         elif names:
-            yield message("set_aside_named", "  {what}: {names}", what=told.what, names=names)
+            yield message("set_aside_named", "  {what}: {names}", what=rejected.what, names=names)
 
 
-class _Told:
+class _RejectedKind:
     def __init__(self, what, names=()):
         self.what, self.names = what, tuple(names)
 
@@ -38,17 +38,19 @@ class _Told:
 def _points(result):
     what = message("set_aside_points", "points rejected")
     if result.accepted is None:
-        return _Told(what)
+        return _RejectedKind(what)
     kept = {int(i) for i in result.accepted}
-    return _Told(what, (one for i, one in enumerate(result.job.points.names) if i not in kept))
+    return _RejectedKind(
+        what, (name for i, name in enumerate(result.job.points.names) if i not in kept)
+    )
 
 
 def _straps(result):
     what, straps = message("set_aside_straps", "circumferences rejected"), result.straps
     if straps is None:
-        return _Told(what)
+        return _RejectedKind(what)
     gone = straps.adjusted[~straps.accepted]
-    return _Told(what, (_in_row(straps.reduced[i].strap) for i in gone))
+    return _RejectedKind(what, (_in_row(straps.reduced[i].strap) for i in gone))
 
 
 def _in_row(strap):
@@ -58,9 +60,9 @@ def _in_row(strap):
 def _offsets(result):
     what, read = message("set_aside_offsets", "offsets rejected"), result.read
     if read is None or result.job.lines is None:
-        return _Told(what)
+        return _RejectedKind(what)
     gone = read.places[read.are("offsets")][~read.tests_of("offsets")[2]]
-    return _Told(what, (_at_level(result.job.lines.offsets[i]) for i in gone))
+    return _RejectedKind(what, (_at_level(result.job.lines.offsets[i]) for i in gone))
 
 
 def _at_level(offset):
@@ -72,10 +74,15 @@ def _readings(adjustment):
     """Readings of the survey, the one that contradicts the others most first."""
     what = message("set_aside_readings", "readings rejected")
     removed = () if adjustment is None else adjustment.removed
-    worst = sorted(removed, key=lambda one: -abs(one.w))
-    return _Told(what, (_of_file(one) for one in worst))
+    worst = sorted(removed, key=lambda reading: -abs(reading.w))
+    return _RejectedKind(what, (_of_file(reading) for reading in worst))
 
 
-def _of_file(one):
-    return message("named_in_file", "{ends} ({file}, row {row})", ends="-".join(map(str, one.ids)),
-                   file=one.file, row="-" if one.row is None else str(one.row))  # fmt: skip
+def _of_file(reading):
+    return message(
+        "named_in_file",
+        "{ends} ({file}, row {row})",
+        ends="-".join(map(str, reading.ids)),
+        file=reading.file,
+        row="-" if reading.row is None else str(reading.row),
+    )

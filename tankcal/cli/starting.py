@@ -101,9 +101,11 @@ def _print_command(*words):
 
 def _given(options):
     """The options of the same form, as they were given."""
-    given = {"--kind": options.kind, "--survey": options.survey, "--language": options.language}
+    choices = {"--kind": options.kind, "--survey": options.survey, "--language": options.language}
     usual = {"--kind": USUAL_KIND, "--survey": None, "--language": None}
-    return [word for name, one in given.items() if one != usual[name] for word in (name, one)]
+    return [
+        word for name, value in choices.items() if value != usual[name] for word in (name, value)
+    ]
 
 
 def _write_field_sheets(directory, kind, survey, language):

@@ -55,5 +55,5 @@ def is_of_memory(error):
     Python raises other errors for a library that cannot be loaded and a thread that cannot start.
     """
     if isinstance(error, ImportError | RuntimeError | OSError):
-        return any(one in str(error).lower() for one in _OF_MEMORY)
+        return any(text in str(error).lower() for text in _OF_MEMORY)
     return isinstance(error, MemoryError)

@@ -50,7 +50,7 @@ def _verify(options):
     from tankcal.report.verification import verify
 
     show = Progress(options.quiet or options.machine)
-    found = verify(
+    result = verify(
         options.results,
         options.job,
         hashes_only=options.hashes_only,
@@ -58,23 +58,23 @@ def _verify(options):
         part=show.part,
     )
     show.end()
-    status = 2 if found.problems else 0
+    status = 2 if result.problems else 0
     if options.machine:
-        _print(found, status)
+        _print(result, status)
     else:
-        _tell(found, options.hashes_only)
+        _tell(result, options.hashes_only)
     return status
 
 
-def _print(found, status):
-    again = found.recomputed
+def _print(result, status):
+    again = result.recomputed
     print_json(
         exit_status=status,
-        record_sha256=found.digest,
-        manifest_sha256=found.manifest_sha256,
-        compared=found.compared,
-        inputs_compared=found.inputs_found,
-        papers_made_again=found.papers_again,
+        record_sha256=result.digest,
+        manifest_sha256=result.manifest_sha256,
+        compared=result.compared,
+        inputs_compared=result.inputs_found,
+        papers_made_again=result.papers_again,
         recomputed=None
         if again is None
         else {
@@ -85,10 +85,10 @@ def _print(found, status):
             "largest": None if again.largest is None else _finite(asdict(again.largest)),
             "agrees": again.agrees,
         },
-        compared_by_hash_alone=found.by_hash,
-        compared_by_numbers_alone=found.by_numbers,
-        notes=[str(one) for one in found.notes],
-        problems=[problem_of(one) for one in found.problems],
+        compared_by_hash_alone=result.by_hash,
+        compared_by_numbers_alone=result.by_numbers,
+        notes=[str(note) for note in result.notes],
+        problems=[problem_of(problem) for problem in result.problems],
     )
 
 
@@ -96,22 +96,22 @@ def _finite(values):
     return {key: None if value == float("inf") else value for key, value in values.items()}
 
 
-def _tell(found, hashes_only):
-    for one in found.problems:
-        say(one.text)
-    if found.recomputed is not None:
-        for line in _numbers(found.recomputed):
+def _tell(result, hashes_only):
+    for problem in result.problems:
+        say(problem.text)
+    if result.recomputed is not None:
+        for line in _numbers(result.recomputed):
             say(line)
-    elif found.saved_file == "record.json" and not found.inputs_found:
+    elif result.saved_file == "record.json" and not result.inputs_found:
         say(
             message(
                 "verify_no_inputs",
                 "the input files of the job were not found: neither compared nor computed again",
             )
         )
-    for one in found.notes:
-        say(one)
-    if found.papers_again:
+    for note in result.notes:
+        say(note)
+    if result.papers_again:
         say(message("verify_papers_again", "the reports were created again and compared"))
     if hashes_only:
         say(
@@ -120,7 +120,7 @@ def _tell(found, hashes_only):
                 "hashes only: no report was created and no number was computed again",
             )
         )
-    _sum(found)
+    _sum(result)
 
 
 def _numbers(again):
@@ -140,7 +140,7 @@ def _numbers(again):
             different=again.different,
         )
     else:
-        one = again.largest
+        difference = again.largest
         yield message(
             "verify_near_numbers",
             "computed again: {count} numbers, {different} not identical bit for bit; the largest "
@@ -148,11 +148,11 @@ def _numbers(again):
             "{computed} now, {relative} of the largest number there (tolerance {tolerance})",
             count=again.numbers,
             different=again.different,
-            place=one.place,
-            recorded=f"{one.recorded:.12g}",
-            computed=f"{one.computed:.12g}",
-            relative=f"{one.relative:.1e}",
-            tolerance=f"{one.tolerance:.0e}",
+            place=difference.place,
+            recorded=f"{difference.recorded:.12g}",
+            computed=f"{difference.computed:.12g}",
+            relative=f"{difference.relative:.1e}",
+            tolerance=f"{difference.tolerance:.0e}",
         )
     made, now = (", ".join(f"{name} {version}" for name, version in versions.items())
                  for versions in (again.made_by, again.computed_by))  # fmt: skip
@@ -167,10 +167,10 @@ def _numbers(again):
         )
 
 
-def _in_part(found):
+def _in_part(result):
     """Which files were not compared with what they were made of."""
     by_hash, by_numbers = (", ".join(map(printable, names))
-                           for names in (found.by_hash, found.by_numbers))  # fmt: skip
+                           for names in (result.by_hash, result.by_numbers))  # fmt: skip
     if by_hash:
         yield message(
             "verify_by_hash",
@@ -186,19 +186,19 @@ def _in_part(found):
         )
 
 
-def _sum(found):
-    if found.problems:
-        count = len(found.problems)
+def _sum(result):
+    if result.problems:
+        count = len(result.problems)
         text = message("verify_disagree", "{count} disagreements", count=count)
         say(message("verify_disagrees", "1 disagreement") if count == 1 else text)
         return
-    values = {"count": len(found.compared), "file": found.saved_file,
-              "digest": found.digest or found.manifest_sha256}  # fmt: skip
-    if found.is_whole:
+    values = {"count": len(result.compared), "file": result.saved_file,
+              "digest": result.digest or result.manifest_sha256}  # fmt: skip
+    if result.is_whole:
         say(message("verify_agree", "{count} files compared, all agree: {file} is sha256:{digest}",
                     **values))  # fmt: skip
     else:
-        for text in _in_part(found):
+        for text in _in_part(result):
             say(text)
         say(
             message(
@@ -207,6 +207,6 @@ def _sum(found):
                 **values,
             )
         )
-    if found.manifest_sha256 and found.digest:
+    if result.manifest_sha256 and result.digest:
         say(message("verify_manifest", "SHA256SUMS is sha256:{digest}",
-                    digest=found.manifest_sha256))  # fmt: skip
+                    digest=result.manifest_sha256))  # fmt: skip

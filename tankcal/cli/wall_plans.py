@@ -18,50 +18,50 @@ def wall_summary(prediction):
     for kind in ("lines", "offsets", "setups", "hits", "tangents", "runs", "batches"):
         counts[kind] = getattr(has, kind)
     yield plan_holds(plan, counts)
-    for one in prediction.courses:
+    for course in prediction.courses:
         yield message(
             "plan_course_radius",
             "course {course}: u of the mean radius {sd} mm",
-            course=one.name,
-            sd=format_significant(1000 * one.radius_sd_m, 2, marks()),
+            course=course.name,
+            sd=format_significant(1000 * course.radius_sd_m, 2, marks()),
         )
     if prediction.filling is not None:
         yield from _filling(prediction.filling)
 
 
-def _filling(found):
+def _filling(outlook):
     """What runs of liquid would add to the geometry."""
-    for one in found.dips:
+    for dip in outlook.dips:
         yield message(
             "plan_dip_beside",
             "V({dip} m): U = {uncertainty} m3; from geometry alone {before} m3",
-            dip=fixed(one.dip_m, 3, marks()),
-            uncertainty=format_significant(one.U_m3, 2, marks()),
-            before=format_significant(one.U_geometry_m3, 2, marks()),
+            dip=fixed(dip.dip_m, 3, marks()),
+            uncertainty=format_significant(dip.U_m3, 2, marks()),
+            before=format_significant(dip.U_geometry_m3, 2, marks()),
         )
-    for one in found.causes:
-        if one.kind in SCALES:
+    for cause in outlook.causes:
+        if cause.kind in SCALES:
             yield message(
                 "plan_told_by_liquid",
                 "{name}: u {before} {unit} without the liquid, {after} {unit} with it",
-                name=one.name or message("plan_scale_of_all", "scale"),
-                unit=one.unit,
-                before=format_significant(one.u_before, 3, marks()),
-                after=format_significant(one.u_after, 3, marks()),
+                name=cause.name or message("plan_scale_of_all", "scale"),
+                unit=cause.unit,
+                before=format_significant(cause.u_before, 3, marks()),
+                after=format_significant(cause.u_after, 3, marks()),
             )
-    if found.detectable_radius_m is not None:
+    if outlook.detectable_radius_m is not None:
         yield message(
             "plan_radius_shown",
             "smallest detectable offset of all radii of the geometry: {radius} mm",
-            radius=format_significant(1000 * found.detectable_radius_m, 2, marks()),
+            radius=format_significant(1000 * outlook.detectable_radius_m, 2, marks()),
         )
 
 
-def wall_scatter(found):
+def wall_scatter(scatter):
     """What simulated surveys of drawn walls gave; None: there were none."""
-    if found is None:
+    if scatter is None:
         return
-    low, median, high = found.U_ratios
+    low, median, high = scatter.U_ratios
     yield message(
         "plan_wall_scatter",
         "{runs} simulated surveys of random walls: ratio of volume error to prediction "
@@ -69,16 +69,16 @@ def wall_scatter(found):
         "{median:.2f} ({low:.2f} to {high:.2f}); true volume within U in {covered} of full "
         "tanks, {rows} of all rows; {aside:.1f} readings rejected on average, without a "
         "solution: {failed}",
-        runs=found.runs,
-        ratio=found.volume_ratio,
-        ratio_sd=found.volume_ratio_sd,
+        runs=scatter.runs,
+        ratio=scatter.volume_ratio,
+        ratio_sd=scatter.volume_ratio_sd,
         median=median,
         low=low,
         high=high,
-        covered=_share(found.covered),
-        rows=_share(found.within.mean()),
-        aside=found.set_aside.mean(),
-        failed=len(found.failed),
+        covered=_share(scatter.covered),
+        rows=_share(scatter.within.mean()),
+        aside=scatter.set_aside.mean(),
+        failed=len(scatter.failed),
     )
 
 
@@ -94,7 +94,7 @@ def wall_item(change):
     name = change.name
     if change.item in NUMBERED:
         name = name.replace(".", marks().decimal)
-    told = {
+    items = {
         "strap": message("plan_item_strap", "circumference {name}", name=name),
         "line": message("plan_item_lines", "{name} reference lines", name=name),
         "face": message("plan_item_face", "the second face of the plummet"),
@@ -125,7 +125,7 @@ def wall_item(change):
         return message("plan_item_finer_dips", "each dip, with half its s_dip_mm")
     if change.item == "half_steps" and change.action == "drop":
         return message("plan_item_every_second", "every second dip of run {name}", name=name)
-    return told.get(change.item)
+    return items.get(change.item)
 
 
 def _filling_items(name):
