@@ -1,7 +1,7 @@
-"""Names beside the marks of a drawing, none over another or over a mark.
+"""Placement of labels beside the marks of a drawing without overlaps.
 
-A name goes to the first of the places about its mark that is free; where no form of it finds one
-it is left out. Sizes of text are estimated, since the reader's program sets it.
+A label takes the first free position around its mark. If no form of the label fits, it is left out.
+Text sizes are estimated, because the viewer renders the text.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,18 @@ _ENDS = {-1: "top", 0: "center", 1: "bottom"}
 
 @dataclass(frozen=True)
 class Label:
-    """A name beside a place of a drawing.
+    """Label of a position in a drawing.
 
-    x, y     the place, in the units of the axes
-    texts    the name, then shorter forms of it
-    clear    typographic points from the place to the name, at least
-    outward  (2,) direction that is tried first
+    Attributes
+    ----------
+    x, y : float
+        Position in the units of the axes.
+    texts : tuple of str
+        The name, then shorter forms.
+    clear : float
+        Smallest distance between position and label, typographic points.
+    outward : tuple of float
+        Preferred direction (2,).
     """
 
     x: float
@@ -34,11 +40,23 @@ class Label:
 
 
 def write_labels(ax, labels, marks, *, size, room=MARK, **style):
-    """Write the labels that find room, the first first; returns how many were left out.
+    """Write the labels that fit, in the given order; return the number of labels left out.
 
-    marks   (n, 2) places that no name may cover, in the units of the axes
-    room    typographic points about a mark that are kept free, one for all or (n,)
-    The axes must have their final limits and place.
+    Parameters
+    ----------
+    ax : matplotlib Axes
+        With final limits and position.
+    labels : sequence of Label
+    marks : array_like (n, 2)
+        Positions that no label may cover, in the units of the axes.
+    size : float
+        Type size, points.
+    room : float or array_like (n,)
+        Free radius around a mark, typographic points.
+
+    Returns
+    -------
+    int
     """
     ax.apply_aspect()
     places = _in_points(ax, np.array([[item.x, item.y] for item in labels]).reshape(-1, 2))
@@ -62,12 +80,12 @@ def write_labels(ax, labels, marks, *, size, room=MARK, **style):
 
 
 def _in_points(ax, xy):
-    """Places of the axes in typographic points of the figure."""
+    """Convert positions in the axes to typographic points of the figure."""
     return ax.transData.transform(xy) * 72 / ax.figure.dpi
 
 
 def _free(label, place, taken, frame, size):
-    """(text, side, offset, box) of the first form and place that cover nothing; None: none."""
+    """Return (text, side, offset, box) of the first free form and position, or None."""
     sides = sorted(AROUND, key=lambda side: -np.dot(side, label.outward) / np.hypot(*side))
     for text in label.texts:
         extent = np.array([LETTER * len(text), LINE]) * size
@@ -83,7 +101,7 @@ def _free(label, place, taken, frame, size):
 
 
 def _overlaps(box, others):
-    """(n,) whether a box [x0, y0, x1, y1] covers part of each of the others."""
+    """Return whether a box [x0, y0, x1, y1] overlaps each of the others, shape (n,)."""
     x0, y0, x1, y1 = others.T
     beside = (x0 < box[2]) & (box[0] < x1)
     return beside & (y0 < box[3]) & (box[1] < y1)

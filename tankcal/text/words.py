@@ -1,4 +1,4 @@
-"""Codes of the record as sentences, in the reader's language (report_templates/words/)."""
+"""Conversion of the codes of a record to sentences in the language of the reader."""
 
 from numbers import Integral, Number
 
@@ -11,23 +11,23 @@ from tankcal.text.word_files import load_words as load_words  # the door to word
 
 
 def language_of(record):
-    """The language that the job of a record asks for."""
+    """Return the language of the job of a record."""
     table = record["job"]["table"] or {}  # a survey alone has none
     return table.get("language") or DEFAULT
 
 
 def marks_of(words):
-    """What stands between the digits of numbers in this language (digits.Marks)."""
+    """Return the decimal mark and other number marks of a language (digits.Marks)."""
     return Marks(**words["language"]["marks"])
 
 
 def sentence(words, group, code, value=None):
-    """What `code` (with `value`) of the record says, as a sentence of `words[group]`.
+    """Return the sentence of `words[group]` for `code` (and `value`) of the record.
 
-    A template may use {value}: a list comes as its items joined by ", ", a number with up to six
-    digits. A table of templates is looked up by the value as text, then "none" for null or an empty
-    list, then "other". A code or value without words comes back as "code: value", for an assumption
-    is never hidden.
+    A template may contain {value}: a list is shown as its items joined by ", ", a number with up to
+    six digits. In a table of templates, the key is the value as text, then "none" for null or an
+    empty list, then "other". A code or value without words is shown as "code: value", so that no
+    assumption is hidden.
     """
     if isinstance(value, list | tuple):
         value = ", ".join(str(item) for item in value) or None
@@ -42,7 +42,7 @@ def sentence(words, group, code, value=None):
 
 
 def choice_sentence(words, choice):
-    """One choice {code, value} of the record as a sentence, its numbers in the reader's style."""
+    """Return the sentence of a choice {code, value} of the record."""
     code, value = choice["code"], choice["value"]
     if code == "coverage":
         value = percent(words, value)
@@ -60,7 +60,7 @@ MESSAGES = ("warnings", "formulas", "datum", "problems")  # groups of their temp
 
 
 def message_sentence(words, text, code, values):
-    """A text of the record in the reader's language; as it is where its code has no words."""
+    """Translate a text of the record; it is unchanged if its code has no words."""
     template = next(
         (words[group][code] for group in MESSAGES if code in words.get(group, {})), None
     )
@@ -78,13 +78,13 @@ def message_sentence(words, text, code, values):
 
 
 def say(words, text):
-    """A text in the reader's language, if it is a Message; any other text as it is."""
+    """Return a Message in the language of the reader; any other text is returned unchanged."""
     known = as_plain(text)
     return message_sentence(words, str(text), known["code"], known["values"])
 
 
 def translate_record(words, record):
-    """A record whose texts are in the reader's language, as far as it says them by a code."""
+    """Return a record with texts in the language of the reader, where the texts have codes."""
     adjustment, corrections = record["adjustment"], record["corrections"]
     return {
         **record,
@@ -96,6 +96,7 @@ def translate_record(words, record):
 
 
 def _adjustment_in_language(words, adjustment):
+    """Return the adjustment of a record with translated texts."""
     left_out = [_said(words, row, "text") for row in adjustment.get("left_out", [])]
     places = {}
     if residuals := adjustment.get("residuals"):  # by columns
@@ -113,31 +114,31 @@ def _adjustment_in_language(words, adjustment):
 
 
 def _rule_in_language(words, record):
-    """The verdict with the texts of a shipped rule; those of a laboratory's own file stay."""
+    """Return the verdict with translated texts of a shipped rule; user rules stay unchanged."""
     rule, texts = record["rule"], words.get("rule_texts", {})
     return {**rule, "rule": {**rule["rule"], **texts.get(record["job"]["table"]["rule"], {})}}
 
 
 def _said(words, row, key, of=""):
-    """A row of the record with the text in `key`; one of an older record has no code."""
+    """Return a row with a translated text in `key`; rows of older records have no code."""
     code, values = row.get(f"{of}code"), row.get(f"{of}values", {})
     return {**row, key: message_sentence(words, row[key], code, values)}
 
 
 def _placed(words, row):
-    """A row of the record whose sheet is named in the reader's language."""
+    """Return a row of the record with a translated name of its sheet."""
     return {**row, "file": _place_said(words, row["file"])}
 
 
 def _place_said(words, file):
-    """The name of a file as it is, of a sheet with the language's word for it."""
+    """Return a file name unchanged, or the translated name of a sheet."""
     if not file.startswith(SHEET):
         return file
     return message_sentence(words, file, "in_sheet", {"sheet": file.removeprefix(SHEET)})
 
 
 def _number(value, form, marks):
-    """A number in a form of Python, ".1f", ".3g", "+g" or "" for a count, with these marks."""
+    """Format a number with a Python format (".1f", ".3g", "+g"; "" for a count) and marks."""
     if value is not None and not isinstance(value, Number):
         return str(value)
     if not form and not isinstance(value, Integral):
@@ -150,7 +151,7 @@ def _number(value, form, marks):
 
 
 def _named(words, key, value):
-    """Codes among the values of a message as their names."""
+    """Replace codes among the values of a message by names."""
     if key == "row" or key.endswith("_row"):
         return str(value)  # no count
     if key == "note":
@@ -172,7 +173,7 @@ def _named(words, key, value):
 
 
 def _notes(words):
-    """{English note of a key or column of a job: the same in this language}."""
+    """Return {English note of a key or column of a job: translated note}."""
     translated = words.get("input", {}).get("notes", {})
     return {
         note: translated[group][key]
@@ -193,9 +194,9 @@ NAMED_INPUTS = (
 
 
 def input_name(words, row):
-    """The name of an input of the budget; a default is marked as such.
+    """Return the name of an input of the budget; a default value is marked.
 
-    Some have the name of their item or instrument beside it.
+    Some inputs include the name of their item or instrument.
     """
     shared = row["input"] == "deadwood" and row["unit"] == "%"
     name = name_of_input(words, "deadwood_share" if shared else row["input"])
@@ -205,7 +206,7 @@ def input_name(words, row):
 
 
 def name_of_input(words, code):
-    """An input by its code; correlated ones are one, "a & b"."""
+    """Return the name of an input; correlated inputs have one name, "a & b"."""
     return " & ".join(words["inputs"].get(part, part) for part in code.split(" & "))
 
 
@@ -215,7 +216,7 @@ MOST_NAMES = 12  # that a sentence lists
 
 
 def group_name(words, group):
-    """A group of observations in words: "Distances (tape 1)", "Zenith angles"."""
+    """Return the name of a group of observations: "Distances (tape 1)", "Zenith angles"."""
     known, name = words["observed"], group["name"]
     if name in known:
         return known[name]
@@ -224,13 +225,13 @@ def group_name(words, group):
 
 
 def observation_name(words, reading):
-    """What a reading is: some kinds are told apart by their files, such as zenith angles."""
+    """Return the kind of a reading; some, such as zenith angles, are identified by their files."""
     known, kind = words["observations"], reading["kind"]
     return known.get(reading["file"].removesuffix(".csv"), known.get(kind, kind))
 
 
 def global_test_sentence(words, adjustment):
-    """What the global test says, with its bounds."""
+    """Return the result of the global test with its bounds."""
     bounds = adjustment["chi2_bounds"]
     if bounds is None:
         return words["texts"]["test_none"]
@@ -246,13 +247,13 @@ def global_test_sentence(words, adjustment):
 
 
 def scale_sentence(words, adjustment):
-    """Which variance factor the covariances bear."""
+    """Return the variance factor used for the covariances."""
     factor = _fixed(words, adjustment["cov_scale"], 3)
     return words["texts"][f"scale_{adjustment['scale']}"].format(factor=factor)
 
 
 def snooping_sentence(words, adjustment):
-    """How blunders were searched, and how many observations were rejected."""
+    """Return the method of blunder detection and the number of rejected observations."""
     if not adjustment["snooping"]:
         return words["texts"]["snooping_off"]
     removed = {(row["kind"], tuple(row["ids"]), row["row"]) for row in adjustment["removed"]}
@@ -264,7 +265,7 @@ def snooping_sentence(words, adjustment):
 
 
 def datum_sentences(words, adjustment):
-    """What holds the frame, and what depends on that choice."""
+    """Return sentences about the datum and about quantities that depend on it."""
     datum, texts = adjustment["datum"], words["texts"]
     held = [name for name in datum["held"] if datum["choice"] != "inner" or ":" not in name]
     sentences = [texts[f"datum_{datum['choice']}"].format(held=list_names(words, held))]
@@ -285,7 +286,7 @@ def datum_sentences(words, adjustment):
 
 
 def verdict_sentences(words, adjustment):
-    """A sentence for each group of observations that is not what was declared."""
+    """Return a sentence for each group of observations that differs from its declared accuracy."""
     return [
         words["texts"][f"group_{row['verdict']}"].format(
             group=group_name(words, row),
@@ -300,7 +301,7 @@ _FACTORS = {"factor": "factor", "low": "factor_low", "high": "factor_high"}
 
 
 def method_line(words, adjustment):
-    """What was measured, how many points, sigma0: one line for a certificate."""
+    """Return the observations, the number of points and sigma0 in one line for a certificate."""
     parts = []
     if adjustment["photos"]:
         cameras = list_names(words, dict.fromkeys(row["camera"] for row in adjustment["photos"]))
@@ -319,7 +320,7 @@ def method_line(words, adjustment):
 
 
 def list_names(words, names):
-    """The first names, and how many more there are; "P7:xyz" is P7."""
+    """Return the first names and the number of further names; "P7:xyz" is shown as P7."""
     names = [str(name).removesuffix(":xyz") for name in names]
     if names == ["all"]:
         return words["texts"]["all_points"]
@@ -330,17 +331,17 @@ def list_names(words, names):
 
 
 def make_sentence(text):
-    """A text of the record with a capital letter and a full stop."""
+    """Return a text of the record with a capital letter and a full stop."""
     return text[:1].upper() + text[1:].rstrip(".") + "."
 
 
 def percent(words, share):
-    """A share in percent, in the reader's style."""
+    """Format a share in percent with the marks of the language."""
     return f"{shortest(100 * share, marks_of(words))}\N{NO-BREAK SPACE}%"
 
 
 def factor_text(words, value):
-    """A factor of standard deviations."""
+    """Format a ratio of standard deviations."""
     return _fixed(words, value, 2 if value < 10 else 1)
 
 
