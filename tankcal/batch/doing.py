@@ -1,4 +1,4 @@
-"""What a worker does with one job: the steps that are not settled, each all or nothing."""
+"""Steps of one job, run by a worker; each step writes all of its files or none."""
 
 import errno
 import os
@@ -30,7 +30,7 @@ STATUS_OF_EXIT = {2: "refused", 3: "unsound"}
 
 @dataclass(frozen=True)
 class Task:
-    """A job on its way to a worker.
+    """A job submitted to a worker.
 
     Attributes
     ----------
@@ -38,9 +38,9 @@ class Task:
     keys : dict
         {step: SHA-256} of all its steps.
     out : str
-        Absolute path of the batch's folder.
+        Absolute path of the folder of the batch.
     run : str
-        Of the journal.
+        Identifier of the batch run in the journal.
     """
 
     job: BatchJob
@@ -50,21 +50,21 @@ class Task:
 
 
 def do_job(task):
-    """Do what is not settled yet of a job.
+    """Run the steps of a job that have no current result.
 
     Returns
     -------
     status : str
     problems : list of dict
-        The first of them.
+        The first problem, or an empty list.
     count : int
-        Of all problems.
+        Number of problems.
 
     Raises
     ------
     InputError
-        Where this machine does not see the batch's folder, or that takes no more: what stops the
-        batch, for no other job would get further.
+        This machine does not find the folder of the batch, or cannot write to it. This stops the
+        batch, because every other job would fail in the same way.
     """
     _check_folder(task)
     try:
@@ -82,7 +82,7 @@ def do_job(task):
 
 
 def _in_the_way(task, error):
-    """What `do_job` gives where something else lies in the place of a job's folder or outcome."""
+    """Return the result of `do_job` if another object occupies the path of a folder or outcome."""
     path = error.filename2 or error.filename or folder_of(task.out, task.job.name)
     text = message(
         "batch_in_the_way",
@@ -93,7 +93,7 @@ def _in_the_way(task, error):
 
 
 def _do_steps(task):
-    """What `do_job` gives."""
+    """Return the result of `do_job`."""
     name, steps = task.job.name, task.job.asked.do
     outcome = load_outcome(task.out, name) or Outcome(name, task.job.source)
     if not outcome.is_settled_for(task.keys):  # or its worker died before it could say so
@@ -110,7 +110,7 @@ def _do_steps(task):
 
 
 def _after_steps(outcome, task, clock):
-    """The `Outcome` after the steps that were not settled, written after each."""
+    """Run the steps without current result; save and return the `Outcome` after each step."""
     for step in task.job.asked.do:
         if not outcome.is_settled(step, task.keys[step]):
             outcome = replace(
@@ -123,6 +123,7 @@ def _after_steps(outcome, task, clock):
 
 
 def _check_folder(task):
+    """Raise InputError if this machine does not find the folder of the batch."""
     if not os.path.exists(os.path.join(task.out, JOURNAL)):
         import socket
 
@@ -137,7 +138,7 @@ def _check_folder(task):
 
 
 def _outcome_of(step, task, clock):
-    """The `StepOutcome` of doing a step; of whatever goes wrong, what is said of it."""
+    """Run a step and return its `StepOutcome`, also for a step that fails."""
     key, name = task.keys[step], task.job.name
     try:
         with clock.step(step):
@@ -181,6 +182,7 @@ def _outcome_of(step, task, clock):
 
 
 def _unfinished(key, status, problems):
+    """Return the `StepOutcome` of a step with problems."""
     plain_problems = [problem_of(problem) for problem in problems[:MOST_TOLD]]
     return StepOutcome(key, status, problems=plain_problems, problem_count=len(problems))
 
@@ -258,20 +260,23 @@ _DOING = {
 
 
 def _place(task, step):
+    """Return the folder of a step."""
     return folder_of(task.out, task.job.name) / FOLDERS[step]
 
 
 def _record(task):
-    """The saved file that a step is done with: of this batch's run, or the job's own."""
+    """Return the input file of a step: the record of this batch, or of the job."""
     record = _place(task, "run") / RECORD
     return record if "run" in task.job.asked.do else Path(task.job.source)
 
 
 def _language(task, record):
+    """Return the language of the output of a step."""
     return task.job.asked.language or reading.language_of(record)
 
 
 def _letterhead(asked):
+    """Return the letterhead, or None."""
     if asked.letterhead is None:
         return None
     from tankcal.report.letterhead import load
@@ -280,7 +285,7 @@ def _letterhead(asked):
 
 
 class Clock:
-    """Seconds of processor of this process and its ended children, by the part of a job."""
+    """Processor time of this process and its ended child processes, by part of a job."""
 
     PARTS = {  # noqa: RUF012
         "writing_record": "record",
@@ -293,7 +298,7 @@ class Clock:
 
     @contextmanager
     def step(self, part):
-        """What is spent until the end of the block is of this part."""
+        """Add the processor time of the block to this part."""
         before = self._to(part)
         try:
             yield
@@ -301,15 +306,16 @@ class Clock:
             self._to(before)
 
     def progress(self, text, done, total):
-        """As `outputs.write` tells how far it is."""
+        """Take the progress messages of `outputs.write`."""
         self._to(self.PARTS.get(getattr(text, "code", None), self._part))
 
     def seconds(self):
-        """{part: seconds}."""
+        """Return {part: seconds}."""
         self._to(None)
         return {part: round(spent, 3) for part, spent in self._spent.items() if part}
 
     def _to(self, part):
+        """Start timing a part; return the previous part."""
         now, before = _processor_s(), self._part
         self._spent[before] = self._spent.get(before, 0.0) + now - self._since
         self._part, self._since = part, now

@@ -1,7 +1,7 @@
-"""From what the command line names to jobs: folders, workbooks, patterns, lists; their names.
+"""Search for the jobs named on the command line: folders, workbooks, patterns and lists.
 
-A job's name is that of its folder or workbook; jobs of one name have a piece of the SHA-256 of
-their paths behind it. A job that the batch's folder has already keeps its name.
+The name of a job is the name of its folder or workbook. Jobs with equal names have a part of the
+SHA-256 of their path appended. A job already contained in the folder of the batch keeps its name.
 """
 
 import csv
@@ -46,15 +46,15 @@ MOST_LIST_BYTES = 100_000_000
 
 @dataclass(frozen=True)
 class Found:
-    """A job as it was named.
+    """A job as named by the user.
 
     Attributes
     ----------
     source : Path
-        A job folder, a workbook, or a saved file such as record.json; maybe nothing at all, which
-        is told when it is read.
+        Job folder, workbook, or saved file such as record.json. It may not exist; this is reported
+        when it is read.
     own : dict
-        What it has by itself: name, and those of `asked.OWN`.
+        Name and options of this job only, see `asked.OWN`.
     """
 
     source: Path
@@ -68,9 +68,9 @@ class BatchJob:
     Attributes
     ----------
     name : str
-        Of its folder.
+        Name of its folder, unique in the batch.
     label : str
-        Its own name, which others may have, too.
+        Name of the job, which other jobs may also have.
     source : str
         Absolute path.
     asked : Asked
@@ -83,7 +83,7 @@ class BatchJob:
 
 
 def find_jobs(arguments, asked, out=None, known=None):
-    """The jobs that arguments name, in the order of their names.
+    """Return the jobs named by arguments, sorted by name.
 
     Parameters
     ----------
@@ -92,9 +92,9 @@ def find_jobs(arguments, asked, out=None, known=None):
         (`@jobs.txt`, `jobs.csv`).
     asked : Asked
     out : str, optional
-        Absolute path of the batch's folder, where no job is looked for.
+        Absolute path of the folder of the batch, which is not searched.
     known : dict, optional
-        {absolute path: name} of jobs that the batch's folder has.
+        {absolute path: name} of the jobs in the folder of the batch.
 
     Returns
     -------
@@ -103,7 +103,7 @@ def find_jobs(arguments, asked, out=None, known=None):
     Raises
     ------
     InputError
-        For lists that cannot be read, and arguments that name no job.
+        A list cannot be read, or an argument names no job.
     """
     log, jobs = Log(), {}
     wants = _Wanted(_wanted(asked.do), out)
@@ -116,21 +116,21 @@ def find_jobs(arguments, asked, out=None, known=None):
 
 @dataclass(frozen=True)
 class _Wanted:
-    """What is looked for ("jobs", "records" or "either"), and the folder where it is not."""
+    """Kind of objects to search for ("jobs", "records" or "either") and the folder to skip."""
 
     kind: str
     out: str | None
 
 
 def _wanted(do):
-    """What the steps are done with: "jobs", "records", or "either" with the job first."""
+    """Return the input of the steps: "jobs", "records", or "either" with jobs preferred."""
     if "run" in do:
         return "jobs"
     return "either" if do == ("inspect",) else "records"
 
 
 def _named(argument, wants, log):
-    """The `Found`s of an argument."""
+    """Return the `Found` objects of an argument."""
     path = Path(argument.removeprefix("@"))
     if argument.startswith("@") or (path.suffix.lower() == ".csv" and path.is_file()):
         return _listed(path, wants, log)
@@ -144,9 +144,9 @@ def _named(argument, wants, log):
 
 
 def _in_path(path, wants, log, strict=True):
-    """The jobs of one path: itself, or those in a folder.
+    """Return the jobs of a path: the path itself, or the jobs in a folder.
 
-    strict  whether a folder without any is told
+    strict  whether a folder without jobs is a problem
     """
     own = _of_itself(path, wants)
     if own is not None:
@@ -167,6 +167,7 @@ def _in_path(path, wants, log, strict=True):
 
 
 def _nothing_inside(kind):
+    """Return the message for a folder without jobs or results."""
     if kind == "records":
         return message(
             "batch_no_records",
@@ -180,7 +181,7 @@ def _nothing_inside(kind):
 
 
 def _of_itself(path, wants):
-    """The job that a path itself is; None where it is none."""
+    """Return the job that a path is, or None."""
     if path.name == SETTINGS_FILE and path.is_file():
         path = path.parent
     if (path / SETTINGS_FILE).is_file():
@@ -197,7 +198,7 @@ def _of_itself(path, wants):
 
 
 def _in_folder(folder, wants):
-    """Jobs below a folder, sorted; hidden folders, and what lies in jobs, are passed over."""
+    """Return the sorted jobs below a folder, without hidden folders and contents of jobs."""
     sources = []
 
     def fail(error):
@@ -230,7 +231,7 @@ def _in_folder(folder, wants):
 
 
 def _is_job(book):
-    """Whether a workbook has the sheet of a job; one that cannot be looked into is told later."""
+    """Return whether a workbook has the sheet of a job; True also for an unreadable workbook."""
     try:
         with zipfile.ZipFile(book) as file:
             sheets = file.read("xl/workbook.xml")
@@ -243,7 +244,7 @@ def _is_job(book):
 
 
 def _listed(path, wants, log):
-    """The jobs of a list: a line each, or a CSV file with a column job; paths from its folder."""
+    """Return the jobs of a list: one per line, or a CSV file with a column job."""
     data, is_csv = read_bytes(path, log, MOST_LIST_BYTES), path.suffix.lower() == ".csv"
     text = None if data is None else decode(path.name, data, log)
     if text is None:
@@ -269,12 +270,13 @@ def _listed(path, wants, log):
 
 
 def _plain_rows(lines):
+    """Return the rows of a list with one job per line."""
     stripped = (line.strip() for line in lines)
     return [{"job": one} for one in stripped if one and not one.startswith("#")]
 
 
 def _rows(path, text, log):
-    """A dict for each row of a CSV list; [] after telling `log` what is wrong with it."""
+    """Return a dict for each row of a CSV list; [] after adding a problem to `log`."""
     mark = separator_of_text(text, ",")
     lines = [(row, line) for row, line in enumerate(split_lines(text), 1) if is_row(line)]
     table = []
@@ -305,6 +307,7 @@ def _rows(path, text, log):
 
 
 def _dicts(path, headings, table, log):
+    """Return {heading: cell} of each valid row."""
     for row, cells in table:
         if not any(cells):
             continue
@@ -326,7 +329,7 @@ def _dicts(path, headings, table, log):
 
 
 def _with_names(found, asked, known):
-    """`BatchJob`s, each with a name that no other one has."""
+    """Return a `BatchJob` with a unique name for each job."""
     labels = {source: _label(job) for source, job in found.items()}
     taken = {name.casefold(): source for source, name in known.items() if os.path.exists(source)}
     counts = Counter(label.casefold() for label in labels.values())
@@ -344,6 +347,7 @@ def _with_names(found, asked, known):
 
 
 def _refuse_doubles(jobs):
+    """Raise InputError if two jobs have the same name."""
     names = Counter(job.name.casefold() for job in jobs)
     double = sorted({job.name for job in jobs if names[job.name.casefold()] > 1})
     if double:
@@ -356,7 +360,7 @@ def _refuse_doubles(jobs):
 
 
 def _label(job):
-    """The name of a job by itself: as its list says, or of its folder or workbook."""
+    """Return the name of a job: from its list, or from its folder or workbook."""
     if job.own.get("name"):
         return file_name(job.own["name"], "job")
     path = Path(os.path.abspath(job.source))

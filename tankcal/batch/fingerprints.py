@@ -1,7 +1,7 @@
-"""What a step of a job depends on, as one SHA-256: its inputs, the version, what is asked.
+"""SHA-256 of all data that affect a step of a job: inputs, version and options.
 
-Of a job all files below its folder count that a job could read, of a workbook those beside it that
-it names. Too much is harmless (the job is done once more), too little would not be.
+For a job folder, all files that the job could read count; for a workbook, the files beside it that
+it names. An unnecessary file only repeats a computation; a missing file would hide a change.
 """
 
 import json
@@ -42,7 +42,7 @@ FILES_OF_STEP = {
 
 
 def keys_of(job, former=None):
-    """{step: SHA-256} of all that bears on each step of a job.
+    """Return {step: SHA-256} of all data that affect each step of a job.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def keys_of(job, former=None):
     Raises
     ------
     OSError
-        Where an input cannot be read.
+        An input cannot be read.
     """
     inputs, asked = inputs_of(job.source), job.asked
     keys = {}
@@ -75,7 +75,7 @@ def keys_of(job, former=None):
 
 
 def inputs_of(source):
-    """[[name, SHA-256]] of the files that a job is read from; [] where there are none."""
+    """Return [[name, SHA-256]] of the input files of a job; [] if there are none."""
     path = Path(source)
     if path.is_dir():
         return [[name, _digest(path / name)] for name in _files_below(str(path))]
@@ -93,7 +93,7 @@ def inputs_of(source):
 
 
 def _files_below(folder):
-    """Names of the files below a folder that a job there could read, sorted."""
+    """Return the sorted names of the files below a folder that a job in it could read."""
     paths = []
     for place, folders, names in os.walk(folder):
         if place != folder and not RESULTS.isdisjoint(names):
@@ -113,7 +113,7 @@ _files_beside = lru_cache(maxsize=64)(_files_below)  # of folders with many work
 
 
 def _named_in_book(path):
-    """Files beside a workbook that it names, and the tables of an inspection; sorted."""
+    """Return the sorted files named in a workbook, and the tables of an inspection beside it."""
     beside = [name for name in _files_beside(str(path.parent)) if not name.lower().endswith(BOOK)]
     if not beside:
         return []
@@ -129,7 +129,7 @@ def _named_in_book(path):
 
 
 def _named_in_former(path):
-    """The table that a former.toml names, where it lies beside it."""
+    """Return the table named in a former.toml, if it is beside this file."""
     from tankcal.recalibration.inputs import rows_file
 
     try:
@@ -140,12 +140,13 @@ def _named_in_former(path):
 
 
 def _content(named):
-    """A file by its content, another name as it is."""
+    """Return the digest of a file; any other text is returned unchanged."""
     path = None if named is None else Path(named)
     return named if path is None or not path.is_file() else _digest(path)
 
 
 def _digest(path):
+    """Return the SHA-256 of a file, cached by size and modification time."""
     status = os.stat(path)
     return _digest_as_of(str(path), status.st_size, status.st_mtime_ns)
 

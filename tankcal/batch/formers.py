@@ -1,4 +1,4 @@
-"""The former table of each job."""
+"""Former tables of the jobs of a batch."""
 
 import os
 from functools import lru_cache
@@ -14,12 +14,12 @@ ENDINGS = (".toml", ".csv", ".xlsx", ".pdf", ".json")
 
 @lru_cache(maxsize=4)
 def _names_in(folder):
-    """{source: name} of the jobs of a former batch."""
+    """Return {source: name} of the jobs of a former batch."""
     return known_names(folder)
 
 
 def former_or_none(job):
-    """The same; None, too, where a folder of tables has none of its name."""
+    """Return the former table of a job; None if there is no table, or no comparison."""
     try:
         return former_of(job)
     except InputError:
@@ -27,12 +27,12 @@ def former_or_none(job):
 
 
 def former_of(job):
-    """Path of the former table that a job is compared with; None where it is not compared.
+    """Return the path of the former table of a job; None if the job is not compared.
 
     Raises
     ------
     InputError
-        Where a folder of tables has none of its name.
+        A folder of former tables contains no table of this job.
     """
     asked = job.asked
     if "compare" not in asked.do or asked.former is None:

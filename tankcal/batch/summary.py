@@ -1,7 +1,7 @@
-"""The summary of a batch: a row of each job, what changed since the last one; its files.
+"""Summary of a batch: one row per job with the changes since the last batch, and its files.
 
-No time of the clock is in it, nor who did what: the same jobs give the same bytes, whatever the
-number of workers and however often the batch was ended and went on.
+It contains no time and no worker: the same jobs give the same bytes for any number of workers and
+interruptions.
 """
 
 import json
@@ -64,7 +64,7 @@ def write_summary(out, jobs, language):
 
 
 def _former_rows(path):
-    """{name: row} of the last summary; None where there is none that can be read."""
+    """Return {name: row} of the last summary; None if it is missing or invalid."""
     try:
         rows = json.loads(path.read_bytes())["rows"]
         return {row["name"]: row for row in rows} if all(map(is_row, rows)) else None
@@ -73,7 +73,7 @@ def _former_rows(path):
 
 
 def _row(out, job):
-    """What the summary says of one job: by its outcome alone."""
+    """Return the summary row of a job, from its outcome only."""
     outcome, steps = load_outcome(out, job.name), job.asked.do
     row = {"name": job.name, "source": job.source, "status": "failed", **dict.fromkeys(VALUES)}
     problems, warnings, papers, counts = [], [], [], [0, 0]
@@ -100,18 +100,18 @@ def _row(out, job):
 
 
 def changes_of(row, former):
-    """What is otherwise than in the row of the last batch.
+    """Return the differences from the row of the last batch.
 
     Parameters
     ----------
     row, former : dict
-        former None: the job was not there.
+        former None: the last batch did not contain the job.
 
     Returns
     -------
     list of dict
         {"code", ...}: "first"; "status" and verdicts with "old" and "new"; "height_m"; "volume_m3"
-        with "by_m3" and "U_m3", the larger of both U.
+        with "by_m3" and "U_m3", the larger of the two U.
 
     Examples
     --------
