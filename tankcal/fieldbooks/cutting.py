@@ -1,9 +1,9 @@
-"""Numbers that were cut short: a file that broke off, or was spoilt, within a number.
+"""Detection of truncated numbers in a file that is incomplete or damaged.
 
-An instrument writes each kind of number with the same decimals, zeros at the end too. A number with
-FEWER decimals less than the median of its kind was not written by it. What counts is what stands
-there, not the value: 290.0000 is whole, 290. is not. Books of two programs, or of records that are
-written in two ways, have two numbers of decimals, each of them often: these are read as they stand.
+An instrument writes each kind of number with a constant number of decimals, including zeros. A
+number with at least FEWER decimals less than the median of its kind is therefore truncated. Only
+the text counts: 290.0000 is complete, 290. is not. Files of two programs, or with records in two
+forms, have two frequent numbers of decimals. Such numbers are read as written.
 """
 
 import re
@@ -17,7 +17,7 @@ OFTEN, SHARE = 3, 0.1  # so many numbers, and that part of a field, are a way of
 
 
 def tell_cut_numbers(book, log):
-    """Tell each number of a book that its reader handed to `FieldBook.keep_text`."""
+    """Report each truncated number among the texts of `FieldBook.keep_text`."""
     reported_rows = {problem.row for problem in log.problems if problem.file == book.file}
     for column, texts in book.texts.items():
         decimals = [_decimals(text) for text, _ in texts]
@@ -54,13 +54,13 @@ def tell_cut_numbers(book, log):
 
 
 def _decimals(text):
-    """How many digits stand behind the last mark of decimals."""
+    """Return the number of digits after the last decimal mark."""
     _, mark, behind = text.replace(",", ".").rpartition(".")
     return sum(character.isdigit() for character in behind) if mark else 0
 
 
 def _is_without_zeros(texts, decimals, usual):
-    """Whether the file leaves out zeros at the end: some numbers are a little short, none has 0."""
+    """Return whether the file omits final zeros: some numbers are short, none ends with 0."""
     whole = [text for (text, _), count in zip(texts, decimals, strict=True) if count >= usual]
     are_uneven = any(usual - FEWER < count < usual for count in decimals)
     return are_uneven and not any(re.search(r"0\D*$", text) for text in whole)

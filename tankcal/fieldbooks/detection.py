@@ -1,4 +1,4 @@
-"""Which format a file is in, by its content, and its text."""
+"""Detection of the format of a file from its content, and decoding of its text."""
 
 import re
 
@@ -34,11 +34,20 @@ _FOREIGN = {  # formats that are not read: a regular expression of their lines
 
 
 def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
-    """FieldBook of the bytes of a file, or None after telling the log why it cannot be read.
+    """Return the FieldBook of a file, or None after adding a problem to the log.
 
-    wanted     one of FORMATS; None: by its content
-    described  Profile of plain tables, or None
-    custom     gsi.Custom: what code blocks of GSI mean
+    Parameters
+    ----------
+    file : str
+        Name for messages.
+    data : bytes
+    log : Log
+    wanted : str, optional
+        One of FORMATS. None: determined from the content.
+    described : Profile, optional
+        Meaning of the columns of plain tables.
+    custom : gsi.Custom
+        Meaning of GSI code blocks.
     """
     text = _text(file, data, log)
     if text is None:
@@ -87,15 +96,15 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
 
 
 def is_field_book(data):
-    """Whether bytes are a field book in a format that its content shows."""
+    """Return whether the content of a file is a field book in a known format."""
     text = _text("", data, Log())
     return text is not None and _format_of(text, None) is not None
 
 
 def _text(file, data, log):
-    """The text of a file: UTF-8, UTF-16, else the letters of western Windows.
+    """Decode UTF-8, UTF-16 or western Windows text; None after adding a problem to the log.
 
-    Without the control characters of a serial transfer: they are no part of a line.
+    Control characters of serial transfers are removed, because they are not part of the lines.
     """
     encoding = find_encoding(data)
     for name in ("utf-8", "cp1252", "latin-1") if encoding == "utf-8" else (encoding,):
@@ -121,7 +130,7 @@ def _text(file, data, log):
 
 
 def _refusal(text):
-    """Refusal of a text of no format that is read; a format that is recognised gets its name."""
+    """Return the message for an unsupported format; it names the format if that is recognised."""
     lines = _first_lines(text)
     for name, pattern in _FOREIGN.items():
         count = sum(re.match(pattern, line.strip(), re.IGNORECASE) is not None for line in lines)
@@ -140,6 +149,7 @@ def _refusal(text):
 
 
 def _format_of(text, described):
+    """Return the format of a text, or None."""
     lines = _first_lines(text)
     if lines and lines[0].lstrip().startswith("<"):
         return "jxl" if _JOBXML.search(text[:MAX_BYTES]) else None
@@ -153,5 +163,6 @@ def _format_of(text, described):
 
 
 def _first_lines(text):
+    """Return the first non-blank lines."""
     lines = [line for line in text[: LOOKED_AT * MAX_LINE].split("\n") if line.strip()]
     return lines[:LOOKED_AT]

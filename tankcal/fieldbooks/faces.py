@@ -1,10 +1,10 @@
-"""Both faces of the instrument: what they show of it, and their means.
+"""Mean of the two faces of the instrument, and its collimation and index errors.
 
     c = (hz1 - hz2 + 180) / 2 . sin z        collimation error
     i = (v1 + v2 - 360) / 2                  index error of the vertical circle
 
-The mean of both faces is free of c and i. A reading of face 2 alone is turned to face 1. What is
-read on one face alone is freed of the c and i that the pairs of its set-up show, as
+The mean of both faces contains neither c nor i. A single reading on face 2 is converted to face 1.
+Single readings are corrected with the mean c and i of the pairs of their set-up:
 
     hz = hz1 - c / sin z,    v = v1 - i
 """
@@ -23,10 +23,14 @@ DEGREE = math.pi / HALF_TURN
 
 @dataclass(frozen=True)
 class Reading:
-    """What one pointing makes on face 1: one face, or the mean of both.
+    """Result of pointings to one point on face 1: one face, or the mean of both.
 
-    shot   the Shot with values of face 1
-    faces  "1", "2" or "both"
+    Attributes
+    ----------
+    shot : Shot
+        Values of face 1.
+    faces : str
+        "1", "2" or "both".
     """
 
     shot: object
@@ -35,9 +39,18 @@ class Reading:
 
 @dataclass(frozen=True)
 class FaceReport:
-    """What the pairs of a set-up show of its instrument; degrees, metres.
+    """Instrument errors from the pairs of a set-up; degrees, metres.
 
-    collimation, index  (mean, largest distance from the mean) or None without pairs
+    Attributes
+    ----------
+    setup : int
+    pairs : int
+    single : tuple
+        Number of single readings on face 1 and on face 2.
+    collimation, index : tuple or None
+        (mean, largest deviation from the mean); None without pairs.
+    apart_m : float
+        Largest difference of the distances of a pair.
     """
 
     setup: int
@@ -49,9 +62,9 @@ class FaceReport:
 
 
 def reduce_faces(shots, log):
-    """(Readings in the order of the shots, FaceReport of each set-up).
+    """Return the Readings in the order of the shots, and a FaceReport for each set-up.
 
-    The second face of a point is the next shot of its name on the other face in the same set-up.
+    The second face of a point is the next shot with its name on the other face of the same set-up.
     """
     mates, waiting = {}, {}
     for place, shot in enumerate(shots):
@@ -80,7 +93,7 @@ def reduce_faces(shots, log):
 
 
 def _freed(reading, report):
-    """A reading of one face without the mean c and i of its set-up; others as they are."""
+    """Return a single reading corrected by the mean c and i of its set-up."""
     if reading.faces == "both":
         return reading
     sign = 1.0 if reading.faces == "1" else -1.0  # face 2 is turned already
@@ -96,10 +109,12 @@ def _freed(reading, report):
 
 
 def _sine(zenith):
+    """Return the sine of a zenith angle in degrees, at least 0.001."""
     return max(math.sin(zenith * DEGREE), 1e-3)
 
 
 def _on_face_1(shot):
+    """Return a shot converted to face 1."""
     if shot.face == 1:
         return shot
     return replace(
@@ -110,11 +125,12 @@ def _on_face_1(shot):
 
 
 def _turned(direction):
+    """Return a direction plus half a turn, degrees."""
     return (direction + HALF_TURN) % FULL_TURN
 
 
 def _mean(first, second, tally, log):
-    """The mean of a pair on face 1; None after telling that they are none."""
+    """Return the mean of a pair on face 1, or None after reporting that the faces disagree."""
     turned, means = _on_face_1(second), {}
     sine = 1.0
     collimation = index = None
@@ -156,6 +172,7 @@ def _mean(first, second, tally, log):
 
 
 def _report(setup, tally):
+    """Return the FaceReport of a set-up."""
     return FaceReport(
         setup,
         len(tally["pairs"]),
@@ -167,6 +184,7 @@ def _report(setup, tally):
 
 
 def _spread(values):
+    """Return (mean, largest deviation from the mean), or None without values."""
     if not values:
         return None
     mean = sum(values) / len(values)

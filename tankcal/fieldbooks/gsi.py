@@ -1,9 +1,10 @@
-"""Leica GSI-8 and GSI-16: words of a two-figure index, a unit and a signed value.
+"""Leica GSI-8 and GSI-16: words with a two-digit index, a unit and a signed value.
 
-A block begins with word 11 or 41, mostly on a line of its own; digit 6 of a word is its unit. Slope
-distances are what the instrument made of them: its prism constant and ppm are in them already
-(words 51, 58, 59 only say which). Blocks of words 41 to 49 are codes: whether of the readings
-before or after them, or of a station, is the surveyor's custom, and no file says it.
+A block begins with word 11 or 41, usually on a separate line. Digit 6 of a word is its unit. Slope
+distances already contain the prism constant and the ppm of the instrument, which words 51, 58 and
+59 only state. Blocks of words 41 to 49 contain codes. The surveyor determines whether a code
+applies to the readings before or after it, or to a station. The file does not contain this
+information.
 """
 
 import datetime
@@ -49,12 +50,16 @@ UNLIKE_M = 0.003  # between the horizontal distance of the file and that of slop
 
 @dataclass(frozen=True)
 class Custom:
-    """What code blocks mean to the surveyor.
+    """Meaning of code blocks.
 
-    codes    "before": of the readings that follow, up to the next block; "after": of those since
-             the block before it; None: of none
-    station  code whose block begins a station: word 42 its name, word 43 the height of the
-             instrument in millimetres; None: no code does
+    Attributes
+    ----------
+    codes : str or None
+        "before": codes of the following readings, up to the next block. "after": codes of the
+        readings since the previous block. None: not codes of readings.
+    station : str or None
+        Code of the blocks that begin a station: word 42 is its name, word 43 the instrument height
+        in millimetres. None: no such code.
     """
 
     codes: str | None = None
@@ -65,7 +70,7 @@ UNSAID = Custom()
 
 
 def read(text, file, log, custom=UNSAID):
-    """FieldBook of the text of a GSI file."""
+    """Return the FieldBook of the text of a GSI file."""
     book, state = FieldBook(file, "gsi"), _State()
     for row, line in enumerate(text.split("\n"), 1):
         line = line.lstrip(" \t").rstrip("\t")
@@ -90,7 +95,7 @@ def read(text, file, log, custom=UNSAID):
 
 
 class _State:
-    """What holds from line to line."""
+    """Values that apply from one line to the next."""
 
     height = prism = None
     year = time = None
@@ -102,7 +107,7 @@ class _State:
 
 
 def _words(line):
-    """[(index, digit 3, unit, sign and value)] of a line, or None."""
+    """Return [(index, digit 3, unit, sign and value)] of a line, or None."""
     width = 16 if line.startswith("*") else 8
     body = line.lstrip("*")
     step = 7 + width + 1
@@ -122,7 +127,7 @@ def _words(line):
 
 
 def _blocks(words):
-    """The blocks of a line: some programs write several, each begins with its number."""
+    """Return the blocks of a line; some programs write several, each with word 11 or 41 first."""
     blocks = [[words[0]]]
     for word in words[1:]:
         if word[0] in ("11", "41") and (word[1] + word[2]).isdigit():
@@ -132,7 +137,7 @@ def _blocks(words):
 
 
 def _take_code(book, log, row, words, state, custom):
-    """A code block: a station, the code of readings, or told as it stands."""
+    """Read a code block: a station, a code of readings, or a block of unknown meaning."""
     values = _known_words(book, log, row, words)
     if values is None:
         return
@@ -152,7 +157,7 @@ def _take_code(book, log, row, words, state, custom):
 
 
 def _begin_station(book, log, row, name, word, state):
-    """A set-up from a code block; its height of the instrument stands in millimetres."""
+    """Begin a set-up from a code block; the instrument height is in millimetres."""
     height = None
     if word is not None and _has_value(word):
         digits = word[1][1:]
@@ -173,6 +178,7 @@ def _begin_station(book, log, row, name, word, state):
 
 
 def _say_codes(book, blocks):
+    """Add a note about code blocks that are not used."""
     shown = [code for code, _ in blocks if code][:SHOWN]
     text = message(
         "gsi_codes_not_used",
@@ -187,6 +193,7 @@ def _say_codes(book, blocks):
 
 
 def _take(book, log, row, words, state):
+    """Read a block."""
     words_by_index = _known_words(book, log, row, words)
     if words_by_index is None:
         return
@@ -227,7 +234,7 @@ def _take(book, log, row, words, state):
 
 
 def _known_words(book, log, row, words):
-    """{index: (unit, signed value)} of the words that are read; None: one stands twice (told)."""
+    """Return {index: (unit, signed value)} of known words; None after reporting a repeated word."""
     words_by_index = {}
     for index, digits, unit, value in words:
         if digits[0].isdigit() and index not in ("11", "41"):
@@ -247,15 +254,17 @@ def _known_words(book, log, row, words):
 
 
 def _text(word):
+    """Return the text of a word without filling characters."""
     return plain_name(word[1][1:])
 
 
 def _has_value(word):
+    """Return whether a word has a value."""
     return NO_VALUE.fullmatch(word[1][1:]) is None
 
 
 def _value(book, log, row, index, unit, text):
-    """Degrees or metres of a word, or None after telling the log."""
+    """Return the degrees or metres of a word, or None after adding a problem to the log."""
     digits, is_angle = text[1:], index in ("21", "22")
     known = (ANGLES if is_angle else LENGTHS).get(unit)
     if known is None or not (digits.isascii() and digits.isdigit()):
@@ -286,12 +295,13 @@ def _value(book, log, row, index, unit, text):
 
 
 def _say_length(book, name, parts):
+    """Add the unit of a length."""
     last = f"{1000 / parts:g} mm" if name == "m" else f"1/{parts:.0f} ft"
     book.say_units(length=name, last=last)
 
 
 def _take_times(words_by_index, state):
-    """Words 17 (day, month, year: ddmmyyyy) and 19 (month, day, hour, minute)."""
+    """Read words 17 (day, month, year: ddmmyyyy) and 19 (month, day, hour, minute)."""
     date, clock = (
         words_by_index[index][1][-8:] if index in words_by_index else "" for index in ("17", "19")
     )
@@ -306,7 +316,7 @@ def _take_times(words_by_index, state):
 
 
 def _take_constants(book, words_by_index, state):
-    """Prism constant and ppm: only said, for the instrument applied them."""
+    """Read prism constant and ppm for notes only, because the instrument applied them."""
     ppm = None
     if "51" in words_by_index:
         both = _TWO_VALUES.fullmatch(words_by_index["51"][1])
@@ -324,7 +334,7 @@ def _take_constants(book, words_by_index, state):
 
 
 def _take_station(book, row, name, values, is_reading, state):
-    """Begin a set-up where name, coordinates or height of the station change."""
+    """Begin a set-up if name, coordinates or height of the station change."""
     xyz = tuple(values.get(index) for index in OF_STATION)
     xyz, height = None if None in xyz[:2] else xyz, values.get("88")
     if xyz is None and height is None:
@@ -352,11 +362,12 @@ def _take_station(book, row, name, values, is_reading, state):
 
 
 def _are_same(first, second):
-    """Whether two lengths may be one, though their units have other last digits."""
+    """Return whether two lengths agree within the resolution of different units."""
     return None in (first, second) or abs(first - second) <= SAME_M
 
 
 def _take_shot(book, log, row, name, values, code, state):
+    """Read a reading."""
     zenith, distance, level = (values.get(index) for index in ("22", "31", "32"))
     sine = None if zenith is None else abs(math.sin(math.radians(zenith)))
     if distance is None and level and sine:

@@ -1,4 +1,4 @@
-"""From files of instruments to the tables of a job: the door of the room."""
+"""Import of instrument files into the tables of a job."""
 
 import datetime
 from collections import Counter
@@ -24,20 +24,20 @@ SHOWN = 6
 
 @dataclass(frozen=True)
 class Choices:
-    """What the user says of the files.
+    """Options of an import.
 
     Attributes
     ----------
     hits, control, leave, check : tuple of str
-        Patterns of names or codes: bare hits of the wall, control targets, what is not used, and
-        of the hits those that are only compared.
-        Without `hits` the names and codes that begin with WALL, HIT, PAREDE or PARED.
+        Patterns of names or codes: reflectorless readings of the wall, control targets, readings to
+        leave out, and hits for comparison only. Without `hits`: names and codes that begin with
+        WALL, HIT, PAREDE or PARED.
     no_hits : bool
-        There are no hits: only targets.
+        The files contain targets only.
     format : str or None
-        One of "gsi", "rw5", "jxl", "sdr", "csv"; None: by the content.
+        One of "gsi", "rw5", "jxl", "sdr", "csv". None: determined from the content.
     profile : str or Path or None
-        What the columns of a plain table are (TOML).
+        TOML file with the meaning of the columns of a plain table.
     instrument : str
         Name of the instrument in instruments.toml; "": blank.
     targets_mm, targets_arcsec : float or None
@@ -45,12 +45,12 @@ class Choices:
     begin, end : datetime or None
         Times of the first and the last reading, for files without times.
     no_control : bool
-        Known coordinates are not written.
+        Do not write known coordinates.
     codes : str or None
-        Code blocks of GSI are codes of the readings that follow ("before") or of those since the
-        block before ("after"); None: they are told, and not used.
+        GSI code blocks are codes of the following readings ("before") or of the readings since the
+        previous block ("after"). None: code blocks are reported and not used.
     station_code : str or None
-        Code whose blocks begin a station in a GSI file.
+        Code of the blocks that begin a station in a GSI file.
     """
 
     hits: tuple = ()
@@ -72,15 +72,15 @@ class Choices:
 
 @dataclass
 class Imported:
-    """What an import made.
+    """Result of an import.
 
     Attributes
     ----------
     summary : list of str
-        Lines: set-ups, hits, named points, units, what was applied, what was left out.
+        Lines with set-ups, hits, targets, units, applied corrections and records left out.
     warnings : list of Problem
     paths : list of Path
-        Files that were written.
+        Written files.
     """
 
     summary: list = field(default_factory=list)
@@ -159,7 +159,7 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
 
 
 def _unused_customs(choices, books):
-    """Choices about code blocks that no file has, for none is GSI."""
+    """Yield warnings about options for code blocks if no file is GSI."""
     if any(book.format == "gsi" for book in books):
         return
     options = (("--codes", choices.codes), ("--station-code", choices.station_code))
@@ -174,12 +174,14 @@ def _unused_customs(choices, books):
 
 
 def _check_times(choices, log):
+    """Report an end that is not later than the beginning."""
     begin, end = choices.begin, choices.end
     if end is not None and (begin is None or end <= begin):
         log.problem("--end", message("end_before_begin", "expected a time later than --begin"))
 
 
 def _read_all(files, choices, log):
+    """Return the FieldBooks of all files."""
     described = None
     if choices.profile is not None:
         described = read_profile(Path(choices.profile), log)
@@ -203,7 +205,7 @@ def _read_all(files, choices, log):
 
 
 def _joined(books):
-    """([(SetUp, file)], shots) of all books, the places of set-ups counted on."""
+    """Return ([(SetUp, file)], shots) of all books, with consecutive indices of set-ups."""
     stands, shots = [], []
     for book in books:
         shots += [replace(shot, setup=shot.setup + len(stands)) for shot in book.shots]
@@ -212,6 +214,7 @@ def _joined(books):
 
 
 def _tell_empty_setups(books):
+    """Count set-ups without readings as left out."""
     for book in books:
         used = {shot.setup for shot in book.shots}
         for place, stand in enumerate(book.setups):
@@ -221,7 +224,7 @@ def _tell_empty_setups(books):
 
 
 def _names_of_setups(stands, places):
-    """{place: name}: that of the station, or S1, S2, ...; a second one of a station gets -2."""
+    """Return {index: name}: the station, or S1, S2, ...; a repeated station gets -2."""
     named = {stands[place][0].station for place in places} - {""}
     free = (f"S{number}" for number in range(1, len(places) + len(named) + 2))
     free = (candidate for candidate in free if candidate not in named)
@@ -236,11 +239,12 @@ def _names_of_setups(stands, places):
 
 
 def _station(stand, name):
+    """Return the station of a set-up, or the name of the set-up."""
     return stand.station or name
 
 
 def _known_points(books, stands, places, names, log):
-    """{name: list of (xyz, file, row)} of all coordinates that the files give."""
+    """Return {name: list of (xyz, file, row)} of all coordinates in the files."""
     occupied = [(names[place], *stands[place]) for place in places]
     items = [
         (stand.station or name, stand.xyz_m, file, stand.row)
@@ -262,7 +266,11 @@ def _known_points(books, stands, places, names, log):
 
 
 def _with_times(shots, choices):
-    """Shots with the year that times lack; those without a time get one of begin to end."""
+    """Return shots with complete times.
+
+    The year comes from `begin`. If begin and end are given, shots without a time get times evenly
+    spaced between both.
+    """
     begin, end = choices.begin, choices.end
     dated = []
     for shot in shots:
@@ -281,7 +289,7 @@ def _with_times(shots, choices):
 
 
 def _in_year(time, year):
-    """The same day in another year; None: there is no 29 February."""
+    """Return the same day in another year; None for 29 February in other years."""
     try:
         return time.replace(year=year)
     except ValueError:
@@ -289,7 +297,7 @@ def _in_year(time, year):
 
 
 def _control_with_times(chosen, choices, unused, log):
-    """The same without control readings that have no time; told where the user asked for them."""
+    """Remove control readings without a time; report them if the user selected them."""
     without = [reading.shot for reading in chosen.control if reading.shot.time is None]
     if choices.control:
         for shot in without:
@@ -312,6 +320,7 @@ def _control_with_times(chosen, choices, unused, log):
 
 
 def _check_ties(chosen, choices, log):
+    """Report missing standard deviations of readings to targets that tie set-ups."""
     if not chosen.ties:
         return
     for key, value in (("--targets-mm", choices.targets_mm),
@@ -328,7 +337,7 @@ def _check_ties(chosen, choices, log):
 
 
 def _stations(known, stands, chosen, log):
-    """{point: (xyz, file, row)} that the job needs: stations, and targets that tie."""
+    """Return {point: (xyz, file, row)} of the stations and of the targets that tie set-ups."""
     used = [stand.station for stand, _ in stands.values()] + [
         reading.shot.point for reading in chosen.ties
     ]

@@ -1,7 +1,7 @@
-"""Trimble JobXML: records of the controller as XML; angles are decimal degrees, lengths metres.
+"""Trimble JobXML: controller records as XML, with angles in decimal degrees and lengths in metres.
 
-Its readings are raw: prism constant and ppm are applied here, once. The parser takes no document
-type, so no entity can be declared, and nothing outside the file is ever read.
+The readings are raw. Prism constant and ppm are applied here, once. The parser refuses document
+types, so a file can neither declare entities nor refer to other files.
 """
 
 import datetime
@@ -21,13 +21,13 @@ _TIME = re.compile(r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d)(\.\d+)?(Z|[+-]\d\d:?\d\d)?
 
 
 class _Refused(Exception):
-    """The file cannot be read on; it is told."""
+    """The file cannot be read further; the problem is in the log."""
 
 
 def read(data, file, log, encoding=None):
-    """FieldBook of the bytes of a JobXML file.
+    """Return the FieldBook of the bytes of a JobXML file.
 
-    encoding  of the bytes; None: as the file declares it
+    encoding  encoding of the bytes; None: as declared in the file
     """
     book = FieldBook(file, "jxl")
     taker = _Taker(book, log)
@@ -59,7 +59,7 @@ def read(data, file, log, encoding=None):
 
 
 class _Taker:
-    """Gathers each record below FieldBook as {path: text}, and takes it when it ends."""
+    """Handler of XML events that reads each record below FieldBook as {path: text}."""
 
     def __init__(self, book, log):
         self.book, self.log, self.parser = book, log, None
@@ -122,7 +122,7 @@ class _Taker:
             self.book.leave_out(message("jxl_records", "records {kind}", kind=kind[:40]), self.row)
 
     def number(self, key):
-        """A number of the record; None: blank, or none (which is told)."""
+        """Return a number of the record; None if it is blank or invalid (reported)."""
         text = self.record.get(key, "")
         value = number_of(text) if text else None
         if text and value is None:
@@ -186,7 +186,7 @@ class _Taker:
             book.note(text)
 
     def is_deleted(self):
-        """Whether the surveyor deleted the record; it is counted then."""
+        """Return whether the surveyor deleted the record; deleted records are counted."""
         if self.record.get("Deleted", "false").lower() != "true":
             return False
         self.book.reject(message("deleted", "deleted records"), self.row)
@@ -235,7 +235,7 @@ class _Taker:
         )  # fmt: skip
 
     def tell_strays(self):
-        """One problem for each station that is missing."""
+        """Report each missing station once."""
         for station, (count, row) in self.strays.items():
             text = message(
                 "jxl_station",
@@ -248,7 +248,7 @@ class _Taker:
 
 
 def time_of(text):
-    """A date with its time of day, without zone; None where there is none."""
+    """Return date and time without zone, or None."""
     match = _TIME.fullmatch(text.strip()[:40])
     if match is None:
         return None

@@ -1,4 +1,4 @@
-"""A technician's own list (CSV) as a table of a job: foreign headings, units and marks."""
+"""Conversion of a list (CSV) with user-defined headings, units and marks to a table of a job."""
 
 import json
 from dataclasses import dataclass
@@ -24,18 +24,18 @@ MAX_BYTES = 50_000_000
 
 @dataclass
 class ForeignList:
-    """A list as read, and what its headings mean.
+    """A list and the meanings of its headings.
 
     Attributes
     ----------
     name : str
-        Table of the job that it becomes.
+        Table of the job to which it is converted.
     table : Table
-        As read; its decimal mark is that of the list.
+        Rows as read; its decimal mark is the mark of the list.
     meanings : dict of Meaning
-        By heading; others are not used.
+        Meanings by heading; other headings are not used.
     warnings : tuple of Problem
-        Of the reading, such as another encoding.
+        Warnings of the reading, such as another encoding.
     """
 
     name: str
@@ -50,7 +50,7 @@ class ForeignList:
 
     @property
     def missing(self):
-        """Fields that every row needs and that no heading means."""
+        """Required fields without a heading."""
         columns = {meaning.column for meaning in self.meanings.values()}
         return [
             field for field in COLUMNS[self.name] if field.required and field.name not in columns
@@ -58,19 +58,21 @@ class ForeignList:
 
 
 def is_table(name):
-    """Whether a job has a table of this name."""
+    """Return whether a job has a table of this name."""
     return name in COLUMNS
 
 
 def read_list(path, folder, name="points", given=None):
-    """ForeignList of a CSV file for a table of the job in a folder.
+    """Read a CSV file as a ForeignList for a table of the job in a folder.
 
     Parameters
     ----------
     path, folder : Path
     name : str
+        Name of the table.
     given : dict, optional
-        {heading: column} as the user states it; the rest is recognised or remembered.
+        {heading: column} stated by the user. Other headings are recognised, or known from earlier
+        lists.
 
     Raises
     ------
@@ -106,16 +108,18 @@ def read_list(path, folder, name="points", given=None):
 
 
 def _names(fields):
+    """Return the names of fields."""
     return {field.name for field in fields}
 
 
 def _stated(heading, column, fields):
-    """The Meaning that a user states, with the factor of the unit that the heading has."""
+    """Return the Meaning stated by the user, with the factor of the unit in the heading."""
     [field] = [field_ for field_ in fields if field_.name == column]
     return stated_meaning(heading, field)
 
 
 def _check_given(heading, column, table, fields, log):
+    """Report a stated heading or column that does not exist."""
     names = [field.name for field in fields]
     if heading not in table.headings:
         text = message(
@@ -137,6 +141,7 @@ def _check_given(heading, column, table, fields, log):
 
 
 def _declared_decimal(folder, log):
+    """Return the decimal mark declared in job.toml, or NOT_KNOWN."""
     path = folder / SETTINGS_FILE
     data = read_bytes(path, log) if path.is_file() else None
     settings = None if data is None else read_toml(SETTINGS_FILE, data, Log())[0]
@@ -145,7 +150,7 @@ def _declared_decimal(folder, log):
 
 
 def _remembered(folder, name, log):
-    """{heading: column} of earlier lists for a table."""
+    """Return {heading: column} of earlier lists for a table."""
     path = folder / MEMORY_FILE
     data = read_bytes(path, log) if path.is_file() else None
     parsed = None if data is None else parsed_toml(MEMORY_FILE, data, log)
@@ -156,7 +161,7 @@ def _remembered(folder, name, log):
 
 
 def refuse_missing(found):
-    """Raise InputError, with one problem for each column that a ForeignList lacks."""
+    """Raise InputError with one problem for each required column without a heading."""
     log = Log()
     for field in found.missing:
         text = message(
@@ -172,9 +177,9 @@ def refuse_missing(found):
 
 
 def write_list(found, folder, *, replace=False):
-    """Write a ForeignList as a table of the job, and remember its headings; returns the paths.
+    """Write a ForeignList as a table of the job, save its headings, and return the paths.
 
-    Raises InputError with every problem of its values; nothing is written then.
+    Raises InputError with all problems of its values; no file is written then.
     """
     folder, log = Path(folder), Log()
     refuse_missing(found)
@@ -190,7 +195,7 @@ def write_list(found, folder, *, replace=False):
 
 
 def _in_columns(found, log):
-    """The Table with the columns of the job, decimal points, and lengths in their units."""
+    """Return the Table with the columns of the job, decimal points, and lengths in their units."""
     table = found.table
     fields = {field.name: field for field in COLUMNS[found.name]}
     used = [(place, found.meanings[heading]) for place, heading in enumerate(table.headings)
@@ -213,7 +218,7 @@ def _in_columns(found, log):
 
 
 def _converted(cell, factor, decimal):
-    """A number with a decimal point in the unit of its column; other texts as they are."""
+    """Return a number with a decimal point in the unit of its column; other texts are unchanged."""
     if is_blank(cell):
         return cell
     text = cell.strip(" \t")
@@ -229,7 +234,7 @@ def _converted(cell, factor, decimal):
 
 
 def _memory_text(found, folder):
-    """headings.toml with what the headings of this list and of earlier lists mean."""
+    """Return headings.toml with the meanings of the headings of this and earlier lists."""
     path = folder / MEMORY_FILE
     kept = {}
     if path.is_file():

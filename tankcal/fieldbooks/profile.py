@@ -1,4 +1,4 @@
-"""Plain tables (CSV): which column is what, and in which unit, is declared in a profile (TOML)."""
+"""Plain tables (CSV), with columns and units declared in a profile (TOML)."""
 
 import csv
 import datetime
@@ -39,7 +39,7 @@ _MARKS = str.maketrans({mark: " " for mark in "°º'’′\"″-:"})
 
 @dataclass(frozen=True)
 class Profile:
-    """What the columns of a plain table are.
+    """Columns and units of a plain table.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Profile:
 
 
 def read_profile(path, log):
-    """Profile of a TOML file, or None after telling the log what is wrong."""
+    """Return the Profile of a TOML file, or None after adding problems to the log."""
     data, before = read_bytes(path, log, MAX_PROFILE), len(log.problems)
     parsed = None if data is None else parsed_toml(path.name, data, log)
     if parsed is None:
@@ -88,6 +88,7 @@ def read_profile(path, log):
 
 
 def _check_values(file, values, rows, log):
+    """Report invalid values of a profile."""
     for key, choices in CHOICES.items():
         if values.get(key) not in choices:
             text = message("profile_choice", "expected one of {choices}",
@@ -103,11 +104,12 @@ def _check_values(file, values, rows, log):
 
 
 def _is_place(value):
+    """Return whether a value is a column number from 1 to 1000."""
     return isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= 1000
 
 
 def read(text, file, log, profile):
-    """FieldBook of the text of a plain table."""
+    """Return the FieldBook of the text of a plain table."""
     book, values = FieldBook(file, "csv"), profile.values
     places = {
         key: place - 1 for key, place in profile.columns.items() if not isinstance(place, str)
@@ -142,6 +144,7 @@ def read(text, file, log, profile):
 
 
 def _rows(text, file, separator, log):
+    """Yield (row, cells) of each line."""
     for row, line in enumerate(text.split("\n"), 1):
         line = line.rstrip("\r")
         if separator == " ":
@@ -164,7 +167,7 @@ def _rows(text, file, separator, log):
 
 
 def _take(book, log, row, row_cells, values, before):
-    """Take a row; returns what tells its set-up from others."""
+    """Read a row; return the station and instrument height that identify its set-up."""
     lengths = {}
     for key in ("distance", "instrument_height", "target_height"):
         lengths[key] = _number(book, log, row, row_cells.get(key, ""), values)
@@ -208,7 +211,7 @@ def _take(book, log, row, row_cells, values, before):
 
 
 def _number(book, log, row, text, values):
-    """A number, None: blank, False: none, after telling the log."""
+    """Return a number, None if blank, or False after adding a problem to the log."""
     if not text:
         return None
     mark = values["decimal"]
@@ -221,7 +224,7 @@ def _number(book, log, row, text, values):
 
 
 def _angle(book, log, row, text, values):
-    """Degrees, None: blank, False: none, after telling the log."""
+    """Return degrees, None if blank, or False after adding a problem to the log."""
     if not text:
         return None
     if values["angle"] != "dms":
@@ -240,6 +243,7 @@ def _angle(book, log, row, text, values):
 
 
 def _of_parts(text):
+    """Convert a text with degrees, minutes and seconds to degrees, or return None."""
     sign = -1.0 if text.startswith("-") else 1.0
     parts = [number_of(part) for part in text.translate(_MARKS).split()]
     if not 1 <= len(parts) <= 3 or None in parts or any(part >= 60 for part in parts[1:]):
@@ -248,7 +252,7 @@ def _of_parts(text):
 
 
 def _time(text, values):
-    """A time, None: blank, False: not as the profile says."""
+    """Return a time, None if blank, or False if it does not have the form of the profile."""
     if not text:
         return None
     try:

@@ -1,4 +1,4 @@
-"""Rows of the job's tables, as its contract has them, from readings on face 1."""
+"""Rows of the tables of a job from readings on face 1."""
 
 from dataclasses import dataclass
 
@@ -29,7 +29,7 @@ ANGLE_DECIMALS, LENGTH_DECIMALS = 7, 6  # 0.0004 seconds of arc, a micrometre
 
 @dataclass(frozen=True)
 class Row:
-    """One row of a table: {column: text}, and where it comes from."""
+    """One row of a table, {column: text}, with its source."""
 
     cells: dict
     file: str
@@ -37,11 +37,18 @@ class Row:
 
 
 def make_rows(stands, names, stations, sorted_readings, choices):
-    """{table: list of Row}; tables without rows are not in it.
+    """Return {table: list of Row}, without empty tables.
 
-    stands    the SetUps by their place
-    names     {place: name of the set-up in the job}
-    stations  {name of a point: (x, y, z)} that go into control.csv, and {name: (file, row)}
+    Parameters
+    ----------
+    stands : dict
+        {index: (SetUp, file)}
+    names : dict
+        {index: name of the set-up in the job}
+    stations : dict
+        {point: (xyz, file, row)} for control.csv.
+    sorted_readings : Sorted
+    choices : Choices
     """
     tables = {name: [] for name in CONTRACT}
     for place, name in names.items():
@@ -70,6 +77,7 @@ def make_rows(stands, names, stations, sorted_readings, choices):
 
 
 def _row(reading, names, cells, *, distance=False, time=False):
+    """Return the Row of a reading."""
     shot = reading.shot
     cells = {"setup": names[shot.setup]} | cells
     if distance:
@@ -80,6 +88,7 @@ def _row(reading, names, cells, *, distance=False, time=False):
 
 
 def _both_angles(shot):
+    """Return the cells of direction and zenith angle."""
     return {
         "direction_deg": _angle(shot.direction_deg),
         "zenith_deg": _angle(shot.zenith_deg),
@@ -87,6 +96,7 @@ def _both_angles(shot):
 
 
 def _tie(tables, reading, names, choices):
+    """Add the rows of a reading that ties set-ups."""
     shot = reading.shot
     height = _length(shot.target_height_m)
     seconds, millimetres = _number(choices.targets_arcsec), _number(choices.targets_mm)
@@ -113,7 +123,7 @@ def _number(value):
 
 
 def _plain(value, decimals):
-    """Digits without zeros at their end, but with those of a millimetre."""
+    """Format a number without final zeros, with at least three decimals."""
     text = f"{value:.{decimals}f}"
     while text.endswith("0") and len(text) - text.index(".") > 4:
         text = text[:-1]
@@ -121,7 +131,7 @@ def _plain(value, decimals):
 
 
 def check_rows(tables, log):
-    """Tell what the job's contract would refuse, each text once, with the row it comes from."""
+    """Report values that the tables of a job do not allow, each once, with the source row."""
     reported = set()
     for table, rows in tables.items():
         for field in CONTRACT[table]:
@@ -147,7 +157,7 @@ def _refuse(log, row, table, field):
 
 
 def columns_of(table, rows):
-    """The columns that a table needs, in the order of the contract."""
+    """Return the columns that a table needs, in the order of the job format."""
     return [
         field.name
         for field in CONTRACT[table]

@@ -1,6 +1,7 @@
-"""Carlson and TDS raw data (RW5): records of fields that begin with a code of two letters.
+"""Carlson and TDS raw data (RW5): records with fields that begin with a two-letter code.
 
-Angles are packed, ddd.mmssss (MO, AU0), or gon (AU1); lengths are feet, metres or US feet (UN).
+Angles are packed as ddd.mmssss (MO, AU0) or in gon (AU1). Lengths are in feet, metres or US feet
+(UN).
 """
 
 import datetime
@@ -39,7 +40,7 @@ _TIME = re.compile(r"(?:--|,)\s*TM\s*(\d\d?):(\d\d):(\d\d)", re.IGNORECASE)
 
 
 class _State:
-    """What holds from line to line."""
+    """Values that apply from one line to the next."""
 
     length = angle = None  # of MO
     units_told = False  # that they are not known
@@ -53,7 +54,7 @@ class _State:
 
 
 def read(text, file, log):
-    """FieldBook of the text of an RW5 file."""
+    """Return the FieldBook of the text of an RW5 file."""
     book, state = FieldBook(file, "rw5"), _State()
     for row, line in enumerate(text.split("\n"), 1):
         line = line.strip()
@@ -65,6 +66,7 @@ def read(text, file, log):
 
 
 def _take(book, log, row, line, state):
+    """Read a record."""
     kind, fields, code = _fields(line)
     before = len(book.shots)
     if kind in RECORDS:
@@ -92,7 +94,7 @@ def _take(book, log, row, line, state):
 
 
 def _fields(line):
-    """(kind, {code: text}, note) of a record."""
+    """Return (kind, {code: text}, note) of a record."""
     body, _, note = line.partition(",--")
     kind, *parts = body.split(",")
     fields = {}
@@ -105,6 +107,7 @@ def _fields(line):
 
 
 def _take_note(book, row, line, state):
+    """Read the date and time of a note; count other notes."""
     date, time = _DATE.match(line), _TIME.search(line)
     if date:
         month, day, year = (int(number) for number in date.groups())
@@ -122,6 +125,7 @@ def _take_note(book, row, line, state):
 
 
 def _take_mode(book, log, row, fields, state):
+    """Read the units of a record MO."""
     length, angle = (number_of(fields.get(key_, "")) for key_ in ("UN", "AU"))
     angle = 0 if "AU" not in fields else angle
     if length not in UNITS or angle not in (0, 1):
@@ -150,6 +154,7 @@ def _take_mode(book, log, row, fields, state):
 
 
 def _length(book, log, row, text, state):
+    """Return a length in metres, or None."""
     value = number_of(text)
     if value is None:
         refuse_number(log, book.file, row, text)
@@ -158,7 +163,7 @@ def _length(book, log, row, text, state):
 
 
 def _angle(text, state):
-    """Degrees, or None where there are none."""
+    """Return degrees, or None."""
     value = None if text is None else number_of(text)
     if value is None or state.angle is None:
         return None
@@ -166,6 +171,7 @@ def _angle(text, state):
 
 
 def _take_point(book, log, row, name, fields, state):
+    """Read the coordinates of a point."""
     if state.length is None:
         return
     coordinates = [number_of(fields.get(axis, "")) for axis in ("E", "N", "EL")]
@@ -179,6 +185,7 @@ def _take_point(book, log, row, name, fields, state):
 
 
 def _take_shot(book, log, row, kind, fields, code, state):
+    """Read a reading; begin a set-up if station, backsight or instrument height change."""
     if state.length is None:
         if not state.units_told:
             state.units_told = True
@@ -227,6 +234,7 @@ def _take_shot(book, log, row, kind, fields, code, state):
 
 
 def _add(book, log, row, kind, texts, code, state, name):
+    """Add a reading to the book."""
     angles = {
         field_code: _angle(text, state)
         for field_code, text in texts.items()
@@ -264,7 +272,7 @@ def _add(book, log, row, kind, texts, code, state, name):
 
 
 def _direction(angles):
-    """(degrees clockwise or None, whether they count from the backsight)."""
+    """Return (degrees clockwise or None, whether they count from the backsight)."""
     turns = {
         "AR": lambda value: value,
         "AL": lambda value: -value,
@@ -278,7 +286,7 @@ def _direction(angles):
 
 
 def _of_bearing(text, state):
-    """Azimuth of a quadrant bearing such as N45.3000E."""
+    """Return the azimuth of a quadrant bearing such as N45.3000E."""
     match = _BEARING.fullmatch(text.strip())
     value = _angle(match[2], state) if match else None
     if value is None:

@@ -1,4 +1,4 @@
-"""Which readings are bare hits of the wall, which are control targets, which tie set-ups."""
+"""Classification of readings: hits of the wall, control targets, targets that tie set-ups."""
 
 import re
 from collections import Counter
@@ -14,11 +14,16 @@ _RANGE = re.compile(r"(\d{1,9})-(\d{1,9})")
 
 @dataclass(frozen=True)
 class Sorted:
-    """Readings by what they are; each a tuple of Reading.
+    """Readings by kind; each a tuple of Reading.
 
-    hits     of the bare wall
-    control  of control targets, read again to see a drift
-    ties     of targets that tie set-ups
+    Attributes
+    ----------
+    hits : tuple
+        Reflectorless readings of the wall.
+    control : tuple
+        Repeated readings of control targets, for drift.
+    ties : tuple
+        Readings of targets that tie set-ups.
     """
 
     hits: tuple
@@ -27,7 +32,7 @@ class Sorted:
 
 
 def is_meant(shot, patterns):
-    """Whether a pattern means the name or the code of a shot: a range 1-200, or with * and ?"""
+    """Return whether a pattern (1-200, or with * and ?) matches the name or code of a shot."""
     for pattern in patterns:
         limits = _RANGE.fullmatch(pattern)
         if limits and shot.point.isascii() and shot.point.isdigit():
@@ -39,16 +44,22 @@ def is_meant(shot, patterns):
 
 
 def says_hit(shot):
-    """Whether its name or its code calls a shot a hit."""
+    """Return whether the name or the code identifies a shot as a hit."""
     return any(text.upper().startswith(SAID) for text in (shot.point, shot.code))
 
 
 def sort_readings(readings, choices, known, log, leave_out):
-    """Sorted readings of all books.
+    """Return the Sorted readings of all books.
 
-    choices    Choices of the user
-    known      names of points whose coordinates are known
-    leave_out  leave_out(what, Reading): told of each reading that is not used
+    Parameters
+    ----------
+    readings : list of Reading
+    choices : Choices
+    known : set of str
+        Points with known coordinates.
+    log : Log
+    leave_out : callable
+        leave_out(what, Reading), called for each reading that is not used.
     """
     hits, control, others = [], [], []
     for reading in readings:
@@ -76,13 +87,14 @@ def sort_readings(readings, choices, known, log, leave_out):
 
 
 def _values(shot):
+    """Return direction, zenith angle and distance."""
     return shot.direction_deg, shot.zenith_deg, shot.distance_m
 
 
 def _targets(control, others, of_hits, choices, known, leave_out):
-    """(control readings, ties): of targets that nobody called so, by how often they were read.
+    """Return (control readings, ties), from the number of readings of each target.
 
-    of_hits  places of the set-ups of hits; one set-up alone needs no tie
+    of_hits  indices of the set-ups of hits; a single set-up needs no tie
     """
     targets = sorted(
         (*others, *control), key=lambda reading: (reading.shot.setup, reading.shot.row)
@@ -113,6 +125,7 @@ def _targets(control, others, of_hits, choices, known, leave_out):
 
 
 def _refuse_without_hits(readings, choices, log):
+    """Report that no reading is a hit."""
     names = _in_ranges([reading.shot.point for reading in readings])
     shown = [*names[:SHOWN], *(["..."] if len(names) > SHOWN else [])]
     text = message(
@@ -125,7 +138,7 @@ def _refuse_without_hits(readings, choices, log):
 
 
 def _in_ranges(names):
-    """Names in their order, runs of numbers as 1-200."""
+    """Return names in their order, with consecutive numbers as 1-200."""
     runs = []
     for name in dict.fromkeys(names):
         if name.isascii() and name.isdigit() and len(name) < 10:

@@ -1,4 +1,4 @@
-"""What an import says: what was found, what was applied, and what was left out."""
+"""Summary of an import: contents, applied corrections, and records left out."""
 
 from tankcal.errors import Problem
 from tankcal.fieldbooks.detection import NAMES
@@ -12,11 +12,23 @@ APPLIED_BY_INSTRUMENT = ("gsi", "sdr")  # formats whose distances have the prism
 
 
 def summarise(books, chosen, unused, names, stands, reports, coordinates, standing):
-    """Lines, in the order in which a surveyor asks.
+    """Return the lines of the summary.
 
-    unused       {what: shots}
-    coordinates  ({known point: ...}, {those of them that were written: ...})
-    standing     other tables of the folder that have rows
+    Parameters
+    ----------
+    books : list of FieldBook
+    chosen : Sorted
+    unused : dict
+        {reason: shots}
+    names : dict
+        {index: name of the set-up}
+    stands : dict
+        {index: (SetUp, file)}
+    reports : list of FaceReport
+    coordinates : tuple of dict
+        Known points, and the points written to control.csv.
+    standing : list of str
+        Other tables of the folder that contain rows.
     """
     lines = []
     for book in books:
@@ -62,10 +74,12 @@ def summarise(books, chosen, unused, names, stands, reports, coordinates, standi
 
 
 def _of_setup(name, station):
+    """Return the name of a set-up, with its station if different."""
     return name if name == station else f"{name} ({station})"
 
 
 def _of_book(book):
+    """Yield the lines about a file."""
     source = [NAMES[book.format], *([book.instrument] if book.instrument else [])]
     yield message("import_file", "{file}: {made}; {units}", file=book.file, made=source,
                   units=book.units or ["-"])  # fmt: skip
@@ -95,6 +109,7 @@ def _of_book(book):
 
 
 def _of_faces(setup, report):
+    """Yield the lines about the faces of a set-up."""
     yield message(
         "import_faces",
         "set-up {setup}: {pairs} points on both faces (averaged), {first} on face 1 only, "
@@ -128,6 +143,7 @@ def _of_faces(setup, report):
 
 
 def _of_targets(chosen):
+    """Yield the lines about targets."""
     for readings, is_control in ((chosen.control, True), (chosen.ties, False)):
         points = list(dict.fromkeys(reading.shot.point for reading in readings))
         if points and is_control:
@@ -139,7 +155,7 @@ def _of_targets(chosen):
 
 
 def warn_of(chosen, names, stands, reports):
-    """Problems that do not stop an import, but deserve a look."""
+    """Return warnings about readings that may need correction."""
     problems = []
     for place, name in names.items():
         stand, file = stands[place]
@@ -214,7 +230,7 @@ def warn_of(chosen, names, stands, reports):
 
 
 def _of_constants(chosen):
-    """Hits that seem to have been read with the constant of a prism."""
+    """Yield warnings about hits with an unlikely prism constant."""
     hits = {reading.shot.prism_mm for reading in chosen.hits} - {None}
     targets = {reading.shot.prism_mm for reading in (*chosen.control, *chosen.ties)} - {None}
     first = chosen.hits[0].shot if chosen.hits else None
