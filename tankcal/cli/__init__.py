@@ -1,4 +1,4 @@
-"""The command line: arguments, progress, exit status. It computes nothing."""
+"""Command line: arguments, progress and exit status, without computation."""
 
 import argparse
 import os
@@ -69,7 +69,7 @@ the job format: docs/job-format.md; axes, signs and units: docs/conventions.md""
 
 
 def main(arguments=None):
-    """Run the command line; returns the exit status."""
+    """Run the command line and return the exit status."""
     _print_in_any_encoding()
     speak()
     with argparse_in(words_of_run()):
@@ -95,9 +95,9 @@ def main(arguments=None):
 
 
 def _status_of(error):
-    """Exit status of a command that a signal, the memory or the disk ended; prints one line.
+    """Return the exit status after a signal or a lack of memory or disk space; print one line.
 
-    Raises any other error again.
+    Any other error is raised again.
     """
     status = stopped_status(error)
     if status is not None:
@@ -121,14 +121,14 @@ def _status_of(error):
 
 
 def _print_in_any_encoding():
-    """Spell out the letters that the terminal or file lacks: cp1252 on Windows, ASCII."""
+    """Escape characters that the terminal or file cannot encode: cp1252 on Windows, ASCII."""
     for stream in (sys.stdout, sys.stderr):
         if getattr(stream, "errors", None) == "strict":
             stream.reconfigure(errors="backslashreplace")
 
 
 def _options(arguments):
-    """Parsed arguments; names that come after options are names, too."""
+    """Return the parsed arguments; names after options are also names."""
     parser = _parser()
     options, rest = parser.parse_known_args(arguments)
     if rest and (not hasattr(options, "names") or any(word.startswith("-") for word in rest)):
@@ -145,7 +145,7 @@ class _Parser(argparse.ArgumentParser):
         super()._print_message(printable_lines(message), file)
 
     def _check_value(self, action, value):
-        """Refuse a word that is no choice; a misspelt choice is named in place of the list."""
+        """Refuse an invalid choice; suggest a similar choice in place of the list."""
         spelt = None
         if action.choices and value not in action.choices:
             from tankcal.job.tables import meant, shown  # half a second
@@ -159,7 +159,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _Version(argparse.Action):
-    """Prints the version, which is looked for only then."""
+    """Print the version, which is determined only on request."""
 
     def __call__(self, parser, *_):
         print(f"tankcal {tankcal.__version__}")
@@ -167,14 +167,14 @@ class _Version(argparse.Action):
 
 
 def _parser():
-    """The whole parser, in the language that is spoken."""
+    """Return the complete parser in the current language."""
     parser, translate = _parser_in_english()
     translate(parser)
     return parser
 
 
 def _parser_in_english():
-    """(the whole parser, what puts it into the language that is spoken)."""
+    """Return (the complete parser, a function that translates it to the current language)."""
     parser = _Parser(
         prog="tankcal",
         description=DESCRIPTION,
@@ -196,6 +196,6 @@ def _parser_in_english():
 
 
 def _translate(parser):
-    """Put a parser into the language that is spoken."""
+    """Translate a parser to the current language."""
     if words_of_run():
         put_in_words(parser, words_of_run())

@@ -1,4 +1,4 @@
-"""The language that a job asks for, found before all else, so that its problems are told in it."""
+"""Language of a job, determined before loading so that problems are reported in it."""
 
 from pathlib import Path
 
@@ -16,9 +16,9 @@ from tankcal.text.words import load_words
 
 
 def asked_language(path):
-    """The language of a job as `load` takes it, or None where none can be read.
+    """Return the language of a job for `load`, or None if it cannot be read.
 
-    Nothing is told: what is wrong with the job, `load` says.
+    No problem is reported here; `load` reports the problems of the job.
     """
     path, log = Path(path), Log()
     try:
@@ -34,7 +34,7 @@ def asked_language(path):
 
 
 def asked_of_plan(path):
-    """The same of a plan as `load_plan` takes it."""
+    """Return the language of a plan for `load_plan`, or None."""
     from tankcal.planning.given import PLAN_FILE
 
     path = Path(path)
@@ -45,7 +45,7 @@ def asked_of_plan(path):
 
 
 def asked_of_record(path):
-    """The language of the job that a record, or the one in a folder of results, was made of."""
+    """Return the language of the job of a record, or of the record in a folder of results."""
     from tankcal.inspection.basis import RECORD
 
     path = Path(path)
@@ -57,6 +57,7 @@ def asked_of_record(path):
 
 
 def _in_settings(path, log):
+    """Return the language in job.toml or plan.toml."""
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
     parsed = None if data is None else parsed_toml(path.name, data, log)
     section = {} if parsed is None else parsed[0].get("table")
@@ -64,6 +65,7 @@ def _in_settings(path, log):
 
 
 def _in_workbook(path, log):
+    """Return the language in a job workbook."""
     from tankcal.job.excel import MAX_FILE_BYTES, Unreadable, read_sheets
     from tankcal.job.grids import table_rows
     from tankcal.job.sheets import KEY, SECTION, VALUE
@@ -88,7 +90,7 @@ def _in_workbook(path, log):
 
 
 def _of_form(cells):
-    """The language that a form explains the key in."""
+    """Return the language of the explanations of a form."""
     for language in LANGUAGES:
         notes = load_words(language)["input"].get("notes", {})
         if language != DEFAULT and notes["keys"]["table.language"] in cells:

@@ -1,4 +1,4 @@
-"""`tankcal batch`: many jobs, by workers of dask or one after the other."""
+"""`tankcal batch`: computation of many jobs, by dask workers or one after the other."""
 
 import shlex
 import sys
@@ -24,7 +24,7 @@ GIGABYTE = 1 << 30
 
 
 def add(commands):
-    """The parser of `tankcal batch`."""
+    """Add the parser of `tankcal batch`."""
     batch = commands.add_parser(
         "batch",
         help="compute many jobs, on all cores or a cluster",
@@ -153,7 +153,7 @@ def _batch(options):
 
 
 class _BatchProgress:
-    """Progress, and one line for each job that is not done."""
+    """Progress of a batch, with one line for each job that is not done."""
 
     def __init__(self, quiet, machine):
         self.show, self._machine = Progress(quiet), machine
@@ -171,6 +171,7 @@ class _BatchProgress:
 
 
 def _tell(batch, out):
+    """Print the result of a batch."""
     counts = batch.counts
     say(
         message(
@@ -186,5 +187,5 @@ def _tell(batch, out):
 
 
 def _command():
-    """What was typed, to be typed again."""
+    """Return the command line for repetition."""
     return " ".join(["tankcal", *map(shlex.quote, sys.argv[1:])])

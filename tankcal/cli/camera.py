@@ -1,4 +1,4 @@
-"""`tankcal camera`: which parameters belong, comparison and influence of calibrations, and more."""
+"""`tankcal camera`: parameters, calibrations, targets and file formats of cameras."""
 
 from tankcal.cli import camera_runs as runs
 from tankcal.cli.arguments import add_language, parse_count, positive, refuse_argument, share
@@ -6,7 +6,7 @@ from tankcal.messages import message
 
 
 def add(commands):
-    """The parsers of `tankcal camera …`."""
+    """Add the parsers of `tankcal camera …`."""
     camera = commands.add_parser(
         "camera",
         help="cameras: their parameters, calibrations, targets and file formats",

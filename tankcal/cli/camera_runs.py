@@ -1,4 +1,4 @@
-"""What `tankcal camera …` does: read, analyse, show, write. It computes nothing."""
+"""Commands of `tankcal camera …`: input, analysis, output. They compute nothing themselves."""
 
 import json
 from dataclasses import replace
@@ -21,7 +21,7 @@ FIRST_WORDS = 200  # bytes
 
 
 def parameters(options):
-    """Which additional parameters belong in the model."""
+    """Test which additional parameters are significant."""
     prepare_for_small_work()
     from tankcal.calibration.interiors import sets_to_be
     from tankcal.calibration.parameters.analysis import analyse_job, analyse_record
@@ -48,7 +48,7 @@ def parameters(options):
 
 
 def compare(options):
-    """All pairs of calibrations."""
+    """Compare all pairs of calibrations."""
     prepare_for_small_work()
     from tankcal.calibration.stability.comparison import compare as compared
     from tankcal.calibration.stability.grids import parse
@@ -76,7 +76,7 @@ def compare(options):
 
 
 def influence(options):
-    """The same survey with each of several calibrations."""
+    """Compare the adjustments of one survey with several calibrations."""
     prepare_for_small_work()
     from tankcal.calibration.influence.runs import influence as influence_of
     from tankcal.job.calibrations import read_cameras
@@ -99,7 +99,7 @@ def influence(options):
 
 
 def check(options):
-    """Differences at check points against a table of limits."""
+    """Evaluate differences at check points with a table of limits."""
     prepare_for_small_work()
     from tankcal.calibration.product import limits
     from tankcal.calibration.product.check import check_product
@@ -128,7 +128,7 @@ def check(options):
 
 
 def convert(options):
-    """A camera of one program, or of a publication, as another has it."""
+    """Convert cameras to the form of another program or publication."""
     import numpy as np
 
     from tankcal.camera.formats.writing import write_camera
@@ -163,7 +163,7 @@ def convert(options):
 
 
 def _in_form(form, cameras, covariances):
-    """[(name, FramedCamera)] in the form of a publication, and their covariances or None."""
+    """Return [(name, FramedCamera)] in the form of a publication, and covariances or None."""
     from tankcal.camera.formats.published import camera_in_form
 
     converted = [
@@ -174,9 +174,7 @@ def _in_form(form, cameras, covariances):
 
 
 def _cameras_of(options):
-    """[(name, FramedCamera)] of a cameras.toml, a record or a file of another program, and the
-    covariance (13, 13) of each, or None.
-    """
+    """Return [(name, FramedCamera)] of a file, and the covariance (13, 13) of each, or None."""
     from tankcal.calibration.interiors import framed_in
     from tankcal.camera.formats.reading import read_camera
 
@@ -192,7 +190,7 @@ def _cameras_of(options):
 
 
 def _registered(path, pixel_um):
-    """[(name, FramedCamera)] of a cameras.toml, and covariances of their standard deviations."""
+    """Return [(name, FramedCamera)] of a cameras.toml, and covariances from standard deviations."""
     import numpy as np
 
     from tankcal.job.calibrations import read_cameras, with_pixels
@@ -203,7 +201,7 @@ def _registered(path, pixel_um):
 
 
 def _framed(setup):
-    """FramedCamera of a CameraSetup."""
+    """Return the FramedCamera of a CameraSetup."""
     from tankcal.camera.formats.frame import make_film_camera, make_framed_camera
 
     values, form = setup.camera.values, setup.camera.form
@@ -213,7 +211,7 @@ def _framed(setup):
 
 
 def _only(options, cameras, covariances):
-    """The camera of that name alone."""
+    """Return the camera with the requested name only."""
     names = [name for name, _ in cameras]
     if options.name not in names:
         expected = message(
@@ -228,6 +226,7 @@ def _only(options, cameras, covariances):
 
 
 def _tell_error(what, camera):
+    """Warn of the largest difference of a fitted camera within the frame."""
     if camera.error_px > 1e-9:
         away = message("convert_px", "{error:.2g} px", error=camera.error_px)
         if camera.film_mm is not None:
@@ -242,6 +241,7 @@ def _tell_error(what, camera):
 
 
 def _write_new(target, text):
+    """Write a new file; raise InputError if it exists."""
     try:
         with target.open("x", encoding="utf-8") as file:
             file.write(text)
@@ -256,7 +256,7 @@ def _write_new(target, text):
 
 
 def read(options):
-    """Targets from photographs into image_points.csv."""
+    """Measure targets in photographs and write image_points.csv."""
     prepare_for_small_work()
     from tankcal.calibration.targets import Wanted, read_photographs
 
@@ -315,7 +315,7 @@ def _photos(count):
 
 
 def _start(options):
-    """Progress; a folder for the results that is not ours is refused before any work."""
+    """Return the Progress; refuse a folder with other files before any computation."""
     from tankcal.report import camera as camera_papers
 
     if options.out is not None:
@@ -325,7 +325,7 @@ def _start(options):
 
 
 def _load(source, show, language):
-    """The job, with its tank where it has one."""
+    """Return the job, with its tank if it has one."""
     from tankcal.cli.asked_language import asked_language
 
     language = language or asked_language(source)
@@ -337,7 +337,7 @@ def _load(source, show, language):
 
 
 def _record_of(source):
-    """The record when `source` is one, else None."""
+    """Return the record if `source` is a record, else None."""
     if Path(source).suffix.lower() != ".json":
         return None
     from tankcal.record import load
@@ -346,7 +346,7 @@ def _record_of(source):
 
 
 def _is_record(source):
-    """Whether a JSON file is a record rather than another program's: its first words tell."""
+    """Return whether a JSON file is a record, from its first bytes."""
     if Path(source).suffix.lower() != ".json" or not Path(source).is_file():
         return False
     with Path(source).open("rb") as file:
@@ -354,7 +354,7 @@ def _is_record(source):
 
 
 def _finish(results, options, show, paths, job=None, record=None, printed=None):
-    """Print tables or JSON; write the papers where they are asked for."""
+    """Print tables or JSON, and write reports on request."""
     from tankcal.report import camera as camera_papers
 
     language = options.language or _language_of(job, record) or language_of_run()
@@ -378,7 +378,7 @@ def _finish(results, options, show, paths, job=None, record=None, printed=None):
 
 
 def _language_of(job, record):
-    """The language that a job, or a record, asks for; None where there is neither."""
+    """Return the language of a job or a record, or None."""
     from tankcal.text.words import language_of
 
     if record is not None:
@@ -387,6 +387,7 @@ def _language_of(job, record):
 
 
 def _refuse_several(options, count):
+    """Raise InputError for --out with several sets of parameters."""
     if options.out is not None and count > 1:
         several = message(
             "camera_several_sets",

@@ -1,4 +1,4 @@
-"""`tankcal compare`: a former table and a new one of the same tank."""
+"""`tankcal compare`: comparison of a former and a new table of one tank."""
 
 from tankcal.cli.arguments import add_language
 from tankcal.cli.machine import add_json, print_saved
@@ -18,7 +18,7 @@ MOST_WARNINGS = 10  # that are shown
 
 
 def add(commands):
-    """The parser of `tankcal compare`."""
+    """Add the parser of `tankcal compare`."""
     compare = commands.add_parser(
         "compare",
         help="compare a former table with a new one of the same tank",
@@ -86,7 +86,7 @@ def _compare(options):
 
 
 def _tell(comparison):
-    """Warnings, what makes up the difference, the verdict and its reasons."""
+    """Print warnings, the components of the difference, and the verdict with its reasons."""
     from tankcal.report.comparison import ComparisonPaper
 
     paper = ComparisonPaper(comparison, language_of_run())

@@ -16,7 +16,7 @@ from tankcal.messages import message, printable
 
 
 def add(commands):
-    """The parser of `tankcal export`."""
+    """Add the parser of `tankcal export`."""
     parser = commands.add_parser(
         "export",
         help="write a table for a gauging or inventory system",
@@ -108,7 +108,7 @@ def _refuse_missing(options):
 
 
 def _out(options, export, source):
-    """The file to write: as asked, or named by the tank and the profile, in this folder."""
+    """Return the output file: as requested, or named after tank and profile in this folder."""
     from tankcal.exports.exporting import default_name
 
     if options.out is not None:
@@ -130,7 +130,7 @@ def _out(options, export, source):
 
 
 def _list(options):
-    """The profiles that ship: name, system, points, whether it was verified."""
+    """Print the shipped profiles: name, system, points, whether verified."""
     from tankcal.exports.profiles import shipped_profiles
 
     profiles = shipped_profiles()

@@ -1,7 +1,7 @@
-"""The help of the command line, and its usage errors, in the language that is spoken.
+"""Help and usage errors of the command line in the current language.
 
-The English stands where the arguments are made; the other languages have theirs in their words
-under [help], by the command and the name of the argument.
+The English text is in the definitions of the arguments. Translations are in the words of each
+language under [help], by command and name of the argument.
 """
 
 import argparse
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 
 def put_in_words(parser, words):
-    """Give a parser and those of its commands the texts of [help]."""
+    """Replace the texts of a parser and of its commands by the texts of [help]."""
     known = words["help"]
     texts = known[_name(parser)]
     parser.description = texts.get("about", parser.description)
@@ -27,7 +27,7 @@ def put_in_words(parser, words):
 
 @contextmanager
 def argparse_in(words):
-    """Within it argparse itself says what it says in these words; {}: in English."""
+    """Translate the messages of argparse within the block; {}: English."""
     translations = words.get("help", {}).get("argparse", {})
     before = argparse._, argparse.ngettext
 
@@ -46,12 +46,12 @@ def argparse_in(words):
 
 
 def _put_in_list(action, known):
-    """The line of each command in the list of them."""
+    """Replace the one-line help of each command in a list."""
     names = {name: _name(command_parser) for name, command_parser in action.choices.items()}
     for line in action._choices_actions:
         line.help = known[names[line.dest]]["line"]
 
 
 def _name(parser):
-    """The command of a parser: "tankcal", "run", "camera read"."""
+    """Return the command of a parser: "tankcal", "run", "camera read"."""
     return parser.prog.removeprefix("tankcal ")

@@ -1,4 +1,4 @@
-"""`tankcal history`: the tables of one tank over the years."""
+"""`tankcal history`: tables of one tank over the years."""
 
 from tankcal.cli.arguments import add_language, parse_dips
 from tankcal.cli.machine import add_json, print_saved
@@ -18,7 +18,7 @@ MOST_SHOWN = 20  # warnings, and files that are left out
 
 
 def add(commands):
-    """The parser of `tankcal history`."""
+    """Add the parser of `tankcal history`."""
     history = commands.add_parser(
         "history",
         help="show the tables of one tank over the years",
@@ -93,7 +93,7 @@ def _history(options):
 
 
 def _tell(history):
-    """Warnings, then a line for each certificate, change and inspection."""
+    """Print warnings and a line for each certificate, change and inspection."""
     from tankcal.report.history import HistoryPaper
 
     paper = HistoryPaper(history, language_of_run())

@@ -1,4 +1,4 @@
-"""`tankcal import`: field books of instruments become the CSV files of a job."""
+"""`tankcal import`: conversion of instrument field books to the CSV files of a job."""
 
 import datetime
 import shlex
@@ -15,7 +15,7 @@ LISTS = (".csv", ".txt", ".tsv")
 
 
 def add(commands):
-    """The parser of `tankcal import`."""
+    """Add the parser of `tankcal import`."""
     parser = commands.add_parser(
         "import",
         help="import field books or a list of points into a job",
@@ -124,7 +124,7 @@ def _time(text):
 
 
 def _asked_of_folder(folder):
-    """The language of the job that the tables go to; None: there is none yet."""
+    """Return the language of the job in a folder, or None."""
     from tankcal.cli.asked_language import asked_language
 
     return asked_language(folder) if (folder / SETTINGS_FILE).is_file() else None
@@ -177,7 +177,7 @@ def _import(options):
 
 
 def _folder_here():
-    """The folder of the command when it is a job."""
+    """Return the current folder if it is a job."""
     if Path(SETTINGS_FILE).is_file():
         return "."
     raise refuse_argument(
@@ -186,7 +186,7 @@ def _folder_here():
 
 
 def _refuse_workbook(folder):
-    """Raise InputError for a job that is filled in as a workbook: its CSV files are not read."""
+    """Raise InputError for a job in a workbook, because its CSV files would not be read."""
     if (folder / WORKBOOK_FILE).is_file() and not (folder / "job.toml").is_file():
         text = message(
             "import_into_workbook",
@@ -198,7 +198,7 @@ def _refuse_workbook(folder):
 
 
 def _list_of(options):
-    """ForeignList of the only file where it is a list of points or of another table, or None."""
+    """Return the ForeignList of a single file with a list of points or another table, or None."""
     if len(options.names) != 1 or options.profile or options.format:
         return None
     from tankcal.fieldbooks import lists
@@ -241,7 +241,7 @@ def _column(text):
 
 
 def say_written(folder, paths, survey):
-    """Print the files that were written, and the next command."""
+    """Print the written files and the next command."""
     say(message("import_wrote", "wrote into {folder}:", folder=str(folder)))
     for path in paths:
         print(f"  {printable(path)}")
@@ -249,7 +249,7 @@ def say_written(folder, paths, survey):
 
 
 def _say_next(folder, survey):
-    """What to do then; a folder without job.toml holds tables, but is no job yet."""
+    """Print the next commands; a folder without job.toml is not yet a job."""
     job = folder
     if not (folder / "job.toml").is_file():
         job = folder.parent / f"{folder.resolve().name or 'tank'}-job"
@@ -269,5 +269,5 @@ def _say_next(folder, survey):
 
 
 def _quoted(path):
-    """A path as a shell takes it; its control characters are spelt out."""
+    """Return a path quoted for a shell, with escaped control characters."""
     return printable(shlex.quote(str(path)))

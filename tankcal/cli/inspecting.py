@@ -1,4 +1,4 @@
-"""`tankcal inspect`: plumb, roundness, welds and settlement of a tank by its survey."""
+"""`tankcal inspect`: plumb, roundness, welds and settlement of a tank from its survey."""
 
 from tankcal.cli.arguments import add_language, yield_mpa
 from tankcal.cli.machine import add_json, print_saved
@@ -17,7 +17,7 @@ NOMINALS = ("drawing", "mean")
 
 
 def add(commands):
-    """The parser of `tankcal inspect`."""
+    """Add the parser of `tankcal inspect`."""
     inspect = commands.add_parser(
         "inspect",
         help="inspect plumb, roundness, welds and settlement of a tank from its survey",
@@ -100,7 +100,7 @@ def _inspect(options):
 
 
 def _tell(inspection):
-    """Warnings, the rule, then a line for each check."""
+    """Print warnings, the rule, and a line for each check."""
     from tankcal.report.inspection import InspectionPaper
 
     paper = InspectionPaper(inspection, language_of_run())
@@ -120,7 +120,7 @@ def _tell(inspection):
 
 
 def _line(paper, check):
-    """One check: its name, the value with U, the limit, the verdict, where it is."""
+    """Return the line of a check: name, value with U, limit, verdict, position."""
     name, verdict = paper.check_name(check["code"]), paper.verdict(check)
     if check["value"] is None:
         return f"{name}: {paper.remark(check) or verdict}"

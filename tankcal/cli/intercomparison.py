@@ -1,4 +1,4 @@
-"""`tankcal intercomparison`: packages of simulated surveys, answers to them, scores."""
+"""`tankcal intercomparison`: packages of simulated surveys, answers, scores."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ MOST_TANKS = 100
 
 
 def add(commands):
-    """The parser of `tankcal intercomparison` and its commands."""
+    """Add the parsers of `tankcal intercomparison` and its commands."""
     parser = commands.add_parser(
         "intercomparison",
         help="compare software: simulated surveys with sealed true volumes, answers, scores",
@@ -252,14 +252,14 @@ def _score(options):
 
 
 def _refuse_existing(out):
-    """Raise InputError where the folder to make is there already, and not empty."""
+    """Raise InputError if the folder to create exists and is not empty."""
     from tankcal.report.folders import refuse_foreign
 
     refuse_foreign(out, ())
 
 
 def _package(folder):
-    """The manifest of a package; raises InputError with all that is wrong."""
+    """Return the manifest of a package; raise InputError with all its problems."""
     from tankcal.intercomparison.package import load_package
     from tankcal.job.tables import Log
 
@@ -270,7 +270,7 @@ def _package(folder):
 
 
 def _tell(scores):
-    """Warnings, then a line for each participant and method."""
+    """Print warnings and a line for each participant and method."""
     from tankcal.report.scores import ScoresPaper
 
     paper = ScoresPaper(scores, language_of_run())

@@ -1,4 +1,4 @@
-"""`tankcal lint`: mistakes in any capacity table."""
+"""`tankcal lint`: errors in any capacity table."""
 
 from tankcal.cli.arguments import add_language, positive
 from tankcal.cli.machine import add_json, print_json
@@ -10,7 +10,7 @@ MOST_FINDINGS = 50  # that are shown at once
 
 
 def add(commands):
-    """The parser of `tankcal lint`."""
+    """Add the parser of `tankcal lint`."""
     lint = commands.add_parser(
         "lint",
         help="check any capacity table for errors",

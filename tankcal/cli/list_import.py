@@ -1,4 +1,4 @@
-"""`tankcal import` of a technician's own list: what its headings mean is shown and confirmed."""
+"""`tankcal import` of a user-defined list: display and confirmation of the headings."""
 
 import sys
 from dataclasses import replace
@@ -16,7 +16,7 @@ NO = ("n", "no", "nao", "não")
 
 
 def import_list(foreign_list, options):
-    """Show what the headings of a ForeignList mean, ask, and write it; returns the exit status."""
+    """Confirm the headings of a ForeignList, write it, and return the exit status."""
     is_asked = sys.stdin.isatty() and sys.stdout.isatty() and not (options.yes or options.machine)
     folder = Path(options.out)
     if is_asked:
@@ -49,7 +49,7 @@ def import_list(foreign_list, options):
 
 
 def _lines(foreign_list, folder):
-    """What the list becomes: a line for each heading."""
+    """Return the lines that show the meaning of each heading."""
     first = message(
         "list_becomes",
         "{file} becomes {table}.csv of {folder}:",
@@ -78,7 +78,7 @@ def _lines(foreign_list, folder):
 
 
 def _ask_missing(foreign_list):
-    """The ForeignList with the headings that the user chooses for columns that it lacks."""
+    """Return the ForeignList with headings chosen by the user for missing columns."""
     meanings = dict(foreign_list.meanings)
     for field in foreign_list.missing:
         free = [one for one in foreign_list.table.headings if one not in meanings]
@@ -99,7 +99,7 @@ def _is_confirmed():
 
 
 def _answer(prompt):
-    """One line of the terminal; its end counts as no."""
+    """Return one line of the terminal; its end counts as no."""
     try:
         return input(prompt).strip()
     except EOFError:

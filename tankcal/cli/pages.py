@@ -1,4 +1,4 @@
-"""`tankcal docs`: the pages of the documentation, which ship with the package."""
+"""`tankcal docs`: the documentation pages shipped with the package."""
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
@@ -7,7 +7,7 @@ FOLDER = "docs"
 
 
 def add(commands):
-    """The parser of `tankcal docs`."""
+    """Add the parser of `tankcal docs`."""
     parser = commands.add_parser(
         "docs",
         help="show the installed documentation",
@@ -21,7 +21,7 @@ def add(commands):
 
 
 def page_names():
-    """Names of the pages, in alphabetical order."""
+    """Return the names of the pages in alphabetical order."""
     from tankcal.text.shipped import shipped_folder
 
     return tuple(sorted(path.stem for path in shipped_folder(FOLDER).glob("*.md")))
@@ -50,6 +50,6 @@ def _docs(options):
 
 
 def _title(path):
-    """The first heading of a page, without its mark."""
+    """Return the first heading of a page without its mark."""
     with path.open(encoding="utf-8") as lines:
         return next((line[2:].strip() for line in lines if line.startswith("# ")), "")

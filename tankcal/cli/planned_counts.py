@@ -1,4 +1,4 @@
-"""How many of each thing a plan has, in words: one photograph, two photographs."""
+"""Numbers of the items of a plan in words: 1 photograph, 2 photographs."""
 
 from tankcal.messages import message
 
@@ -9,16 +9,16 @@ KINDS = (
 
 
 def plan_holds(plan, counts):
-    """What a plan has, of what it may have.
+    """Return the items of a plan in words.
 
-    counts  {kind, of KINDS: how many}
+    counts  {kind, of KINDS: number}
     """
     parts = [counted(kind, count) for kind, count in counts.items() if count]
     return message("plan_holds", "{tank}: {parts}", tank=plan.job.tank.id, parts=parts)
 
 
 def counted(kind, count):
-    """That many of a kind, of KINDS."""
+    """Return the number of items of a kind, of KINDS, in words."""
     singular, plural = {
         "photographs": (
             message("plan_one_photograph", "{count} photograph", count=count),

@@ -1,4 +1,4 @@
-"""`tankcal plan`: what a survey will be worth, before anyone drives to the site."""
+"""`tankcal plan`: prediction of the uncertainty of a survey before the measurement."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ SHOWN = 12  # changes in the terminal
 
 
 def add(commands):
-    """The parser of `tankcal plan`."""
+    """Add the parser of `tankcal plan`."""
     plan = commands.add_parser(
         "plan",
         help="plan a survey: predict the uncertainty of the table before the measurement",
@@ -125,6 +125,7 @@ def _plan(options):
 
 
 def _refuse_idle(options):
+    """Raise InputError for options that have no effect."""
     from tankcal.errors import InputError, Problem
 
     problems = []
@@ -167,7 +168,7 @@ def _refuse_unlimited(plan):
 
 
 def _studied(plan, prediction, options, show):
-    """Effects of all changes, and the path to the smallest design; () and None: not asked for."""
+    """Return the effects of all changes, or (), and the path to the smallest design, or None."""
     from tankcal.planning.improvements import smallest, what_helps
 
     effects = what_helps(plan, progress=show.part, before=prediction) if options.changes else ()
@@ -175,7 +176,7 @@ def _studied(plan, prediction, options, show):
 
 
 def _remedies(plan, error, options, show):
-    """Additions that would give a solution to a survey of targets that has none."""
+    """Yield additions that would determine a survey of targets without a solution."""
     from tankcal.errors import SolutionError
     from tankcal.planning.improvements import what_would_do
     from tankcal.planning.model import Plan
@@ -207,7 +208,7 @@ def _simulated(prediction, options, show):
 
 
 def _summary(prediction):
-    """What was planned, and how well points will be known."""
+    """Yield the items of the plan and the predicted quality of its points."""
     from tankcal.planning.bases import by_ends
 
     plan = prediction.plan
@@ -254,7 +255,7 @@ def _summary(prediction):
 
 
 def _verdict(prediction):
-    """The top of the table, the worst delivery, and the limit."""
+    """Yield the top of the table, the worst delivery, and the limit."""
     plan = prediction.plan
     yield _top(prediction.table)
     for delivery in prediction.tabled.stated.worst[:1]:
@@ -293,7 +294,7 @@ def _judged(limit, meets):
 
 
 def _first(points):
-    """The first names of points, and that there are more."""
+    """Return the first names of points, with dots for further points."""
     return ", ".join(point.name for point in points[:SHOWN]) + ", ..." * (len(points) > SHOWN)
 
 
@@ -306,7 +307,7 @@ def _changes(effects):
 
 
 def _effect(effect):
-    """One change; nothing is said of costs where the plan states none."""
+    """Return the line of a change; costs are shown if the plan states costs."""
     values = {
         "change": describe_change(effect.change),
         "relative": _percent(effect.relative_u),
@@ -327,7 +328,7 @@ def _effect(effect):
 
 
 def describe_change(change):
-    """What is done to which item of a plan."""
+    """Return the action and the item of a change in words."""
     item = wall_item(change) or _item(change.item, change.name)
     if change.action == "add":
         return message("plan_add", "add {item}", item=item)
@@ -337,7 +338,7 @@ def describe_change(change):
 
 
 def _item(item, name):
-    """An item of a plan (`planning.changes.ITEMS`); rows of targets and readings are named so."""
+    """Return an item of a plan (`planning.changes.ITEMS`) in words."""
     from tankcal.planning.changes import IMAGES, OF_COURSE, ROW
 
     if item == "photo_station":

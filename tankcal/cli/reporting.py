@@ -1,4 +1,4 @@
-"""`tankcal report`: the papers again, from a record alone."""
+"""`tankcal report`: reports created again from a record."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ from tankcal.text.languages import LANGUAGES
 
 
 def add(commands):
-    """The parser of `tankcal report`."""
+    """Add the parser of `tankcal report`."""
     report = commands.add_parser(
         "report",
         help="write the reports again, from a record",
@@ -40,7 +40,7 @@ def add(commands):
 
 
 def add_letterhead(parser):
-    """The option --letterhead."""
+    """Add the option --letterhead."""
     parser.add_argument(
         "--letterhead",
         metavar="FILE",
@@ -49,7 +49,7 @@ def add_letterhead(parser):
 
 
 def letterhead_of(options):
-    """The letterhead that the options name, checked; None when they name none."""
+    """Return the checked letterhead of the options, or None."""
     if options.letterhead is None:
         return None
     from tankcal.report.letterhead import load

@@ -1,4 +1,4 @@
-"""`tankcal run` and `tankcal demo`: a job computed, its results written."""
+"""`tankcal run` and `tankcal demo`: computation of a job and output of its results."""
 
 from functools import partial
 from pathlib import Path
@@ -30,7 +30,7 @@ from tankcal.text.digits import (
 
 
 def add(commands):
-    """The parsers of `tankcal run` and `tankcal demo`."""
+    """Add the parsers of `tankcal run` and `tankcal demo`."""
     _add_run(commands)
     demo = commands.add_parser(
         "demo",
@@ -114,7 +114,7 @@ def _demo(options):
 
 
 def _print_doubts_of_job(job, show, tell):
-    """Print the implausible inputs before computing, which may take long with them."""
+    """Print implausible inputs before the computation, which they may slow down."""
     doubts = _doubts_among(job.warnings)
     if doubts and tell is _tell:
         show.end()
@@ -128,7 +128,7 @@ def _doubts_among(warnings):
 
 
 def _tell(out, paths, warnings, result, adjustment):
-    """Print warnings, a summary and the files; implausible inputs once more at the end."""
+    """Print warnings, a summary and the files; print implausible inputs again at the end."""
     doubts = _doubts_among(warnings)
     warn(warning for warning in warnings if warning not in doubts)
     if adjustment is not None:
@@ -142,7 +142,7 @@ def _tell(out, paths, warnings, result, adjustment):
 
 
 def _tell_machine(out, paths, warnings, result, adjustment):
-    """The same as one JSON object."""
+    """Print the results as one JSON object."""
     print_json(
         exit_status=0,
         out=str(out),
@@ -155,7 +155,7 @@ def _tell_machine(out, paths, warnings, result, adjustment):
 
 
 def _top(result):
-    """The top row: numbers in full, k null where U is Monte Carlo's."""
+    """Return the values of the top row; k is null if U results from Monte Carlo."""
     table, stated = result.table, result.intervals
     return {
         "height_m": float(table.height_m[-1]),
@@ -197,7 +197,7 @@ def _compute(cluster, source, out, quiet, strict=False, papers=(), tell=_tell):
 
 
 def _idle_cluster(cluster, clouds):
-    """A warning for workers that were asked for, where there are no clouds for them to read."""
+    """Return a warning for requested workers if there are no clouds to read."""
     if cluster in (None, "auto", 0) or clouds is not None:
         return ()
     text = message("cluster_idle", "without effect: the job has no point cloud")
@@ -205,7 +205,7 @@ def _idle_cluster(cluster, clouds):
 
 
 def _capacity(result):
-    """One line: what the tank holds to the digits of U, and how many points say so."""
+    """Return one line with the capacity, rounded to the digits of U, and the number of points."""
     top_m = result.table.height_m[-1]
     top, stated = result.at(top_m), result.intervals
     unit, factor, decimals = _volume_unit(result.job.table.volume_unit)
@@ -248,7 +248,7 @@ def _capacity(result):
 
 
 def _volume_unit(name):
-    """(a unit of volumes as the terminal shows it, its factor from m3, decimals of a row)."""
+    """Return (unit of volumes for the terminal, its factor from m3, decimals of a row)."""
     from tankcal.tank.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
 
     shown = message("cubic_metres", "m3") if name == "m3" else name
@@ -273,7 +273,7 @@ def _adjust(cluster, source, out, quiet, strict, papers, tell=_tell):
 
 
 def _refuse_failed(adjustment):
-    """Raise when there is an adjustment that is in doubt, or whose global test failed."""
+    """Raise SolutionError for a doubtful adjustment or a failed global test."""
     if adjustment is not None and adjustment.doubts:
         nothing = message("strict_nothing", "no file was written (--strict)")
         raise SolutionError(*(doubt.text for doubt in adjustment.doubts), nothing)
@@ -297,7 +297,7 @@ def _refuse_failed(adjustment):
 
 
 def _summary(adjustment):
-    """One line: how well the survey fits, and how good its points are."""
+    """Return one line with the fit of the survey and the precision of its points."""
     from tankcal.survey.network.quality import precision
 
     removed = len({(removal.kind, removal.ids, removal.row) for removal in adjustment.removed})

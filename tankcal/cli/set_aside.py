@@ -1,6 +1,4 @@
-"""What a run rejected, by name, in a few lines: points of the wall, what tape and reference lines
-read of it, readings of the survey.
-"""
+"""Names of rejected observations: wall points, circumferences, offsets, survey readings."""
 
 from tankcal.messages import message
 
@@ -8,10 +6,13 @@ NAMED = 5  # of each kind
 
 
 def lines_set_aside(result, adjustment):
-    """A line (Message) for each kind of which something was rejected, the first names of it.
+    """Yield a line (Message) with the first names for each kind of rejected observations.
 
-    result      Result of a job, None: only its survey was adjusted
-    adjustment  NetworkAdjustment or None
+    Parameters
+    ----------
+    result : Result or None
+        None: only the survey was adjusted.
+    adjustment : NetworkAdjustment or None
     """
     kinds = [_readings(adjustment)]
     if result is not None:
@@ -31,6 +32,8 @@ def lines_set_aside(result, adjustment):
 
 
 class _RejectedKind:
+    """Kind of rejected observations and their names."""
+
     def __init__(self, what, names=()):
         self.what, self.names = what, tuple(names)
 
@@ -71,7 +74,7 @@ def _at_level(offset):
 
 
 def _readings(adjustment):
-    """Readings of the survey, the one that contradicts the others most first."""
+    """Return the rejected readings of the survey, largest test statistic first."""
     what = message("set_aside_readings", "readings rejected")
     removed = () if adjustment is None else adjustment.removed
     worst = sorted(removed, key=lambda reading: -abs(reading.w))

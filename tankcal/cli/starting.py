@@ -1,4 +1,4 @@
-"""`tankcal new`: an empty job to fill in."""
+"""`tankcal new`: creation of an empty job."""
 
 import shlex
 from pathlib import Path
@@ -12,7 +12,7 @@ USUAL_KIND = "vertical"
 
 
 def add(commands):
-    """The parser of `tankcal new`."""
+    """Add the parser of `tankcal new`."""
     new = commands.add_parser(
         "new",
         help="create an empty job",
@@ -100,7 +100,7 @@ def _print_command(*words):
 
 
 def _given(options):
-    """The options of the same form, as they were given."""
+    """Return the options of the same form as words of a command."""
     choices = {"--kind": options.kind, "--survey": options.survey, "--language": options.language}
     usual = {"--kind": USUAL_KIND, "--survey": None, "--language": None}
     return [

@@ -1,4 +1,4 @@
-"""`tankcal read-table`: the geometry of a tank out of a former table, and a job made of it."""
+"""`tankcal read-table`: geometry of a tank from a former table, and a job for it."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ MOST_SHOWN = 30  # courses
 
 
 def add(commands):
-    """The parser of `tankcal read-table`."""
+    """Add the parser of `tankcal read-table`."""
     parser = commands.add_parser(
         "read-table",
         help="determine radii, head and zero from a former capacity table",
@@ -116,7 +116,7 @@ def _summary(read):
 
 
 def _of_solid(geometry):
-    """Sizes of a lying tank or a sphere."""
+    """Yield the dimensions of a horizontal tank or a sphere."""
     fit = getattr(geometry, "best", geometry)
     values = dict(zip(fit.names, zip(fit.values, fit.u, strict=True), strict=True))
     yield _size(message("read_diameter", "diameter"), values["diameter"])

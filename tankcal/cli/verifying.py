@@ -1,4 +1,4 @@
-"""`tankcal verify`: whether the files of a run belong together, and come out again."""
+"""`tankcal verify`: agreement of the files of a run, and reproduction of the results."""
 
 from dataclasses import asdict
 
@@ -10,7 +10,7 @@ from tankcal.messages import message, printable
 
 
 def add(commands):
-    """The parser of `tankcal verify`."""
+    """Add the parser of `tankcal verify`."""
     verify = commands.add_parser(
         "verify",
         help="check that the files of a run agree and can be reproduced",
@@ -124,7 +124,7 @@ def _tell(result, hashes_only):
 
 
 def _numbers(again):
-    """What came of the numbers, and which versions made them."""
+    """Yield the comparison of the numbers, and the versions that computed them."""
     if again.different == 0:
         yield message(
             "verify_same_numbers",
@@ -168,7 +168,7 @@ def _numbers(again):
 
 
 def _in_part(result):
-    """Which files were not compared with what they were made of."""
+    """Yield the files that were not compared with files created again."""
     by_hash, by_numbers = (", ".join(map(printable, names))
                            for names in (result.by_hash, result.by_numbers))  # fmt: skip
     if by_hash:

@@ -1,4 +1,4 @@
-"""What the terminal says of a plan of straps, reference lines, wall hits, tangents or liquid."""
+"""Terminal output for plans of straps, reference lines, wall hits, tangents or liquid."""
 
 from tankcal.cli.planned_counts import plan_holds
 from tankcal.cli.showing import marks
@@ -9,7 +9,7 @@ SCALES = ("meter_factor", "scale", "instrument_scale")  # that liquid tells some
 
 
 def wall_summary(prediction):
-    """What was planned, and how well the radius of its courses will be known."""
+    """Yield the items of the plan and the predicted u of the course radii."""
     from tankcal.record.wall_plan import survey_of
 
     plan = prediction.plan
@@ -30,7 +30,7 @@ def wall_summary(prediction):
 
 
 def _filling(outlook):
-    """What runs of liquid would add to the geometry."""
+    """Yield the effect of runs of liquid on the uncertainty of the geometry."""
     for dip in outlook.dips:
         yield message(
             "plan_dip_beside",
@@ -58,7 +58,7 @@ def _filling(outlook):
 
 
 def wall_scatter(scatter):
-    """What simulated surveys of drawn walls gave; None: there were none."""
+    """Yield the result of simulated surveys of random walls; nothing for None."""
     if scatter is None:
         return
     low, median, high = scatter.U_ratios
@@ -87,7 +87,7 @@ def _share(number):
 
 
 def wall_item(change):
-    """An item of a plan of the wall; None of other plans."""
+    """Return an item of a plan of the wall in words; None for other plans."""
     from tankcal.planning.wall.changes import NUMBERED
     from tankcal.planning.wall.model import WallPlan
 
@@ -129,7 +129,7 @@ def wall_item(change):
 
 
 def _filling_items(name):
-    """Items of the runs of a plan."""
+    """Return the items of the runs of a plan."""
     return {
         "step": message("plan_item_step", "a step at the end of run {name}", name=name),
         "top_of_run": message(

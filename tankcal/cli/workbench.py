@@ -1,4 +1,4 @@
-"""`tankcal notebook` and `tankcal app`: a job as a notebook, and the same without its code."""
+"""`tankcal notebook` and `tankcal app`: a job as a notebook, with and without code."""
 
 import argparse
 from pathlib import Path
@@ -13,7 +13,7 @@ MOST_PORT = 65535
 
 
 def add(commands):
-    """The parsers of `tankcal notebook` and `tankcal app`."""
+    """Add the parsers of `tankcal notebook` and `tankcal app`."""
     notebook = commands.add_parser(
         "notebook",
         help="edit, check and compute a job in a notebook",
@@ -67,7 +67,7 @@ def _port(text):
 
 
 def _written(options, out):
-    """Path of the notebook of a job, written or kept as it is."""
+    """Return the path of the notebook of a job, after writing it or keeping manual changes."""
     from tankcal.cli.asked_language import asked_language
     from tankcal.workbench.draft import Draft, source_of
     from tankcal.workbench.notebook_file import notebook_path, write_notebook
